@@ -1,0 +1,57 @@
+// What every stereo matcher is: a rectified pair in, a disparity map out, in memory taken at construction.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+
+#include "core/arena.hpp"
+#include "core/disparity.hpp"
+#include "core/image.hpp"
+#include "core/parallel.hpp"
+#include "stereo/checks.hpp"
+#include "stereo/paper_reading.hpp"
+
+namespace groundline::stereo {
+
+class Matcher {
+  public:
+    Matcher() = default;
+    Matcher(const Matcher&) = delete;
+    Matcher& operator=(const Matcher&) = delete;
+    virtual ~Matcher() = default;
+
+    // Matches one rectified pair. All views have the size given at construction; `out` is written whole.
+    // `parallel` may have at most the lanes given at construction. The result depends on the pixels and the
+    // configuration alone. No allocation, no exception; one call at a time.
+    virtual void match(ConstLuma left, ConstLuma right, const DisparityMap& out, Parallel& parallel) = 0;
+
+    // Memory taken from the arena at construction.
+    virtual std::size_t state_bytes() const = 0;
+    // The search range is min_disparity() .. min_disparity() + disparities() - 1, px.
+    virtual int min_disparity() const = 0;
+    virtual int disparities() const = 0;
+};
+
+enum class MatcherKind : std::uint8_t { kPaper };
+
+struct MatcherConfig {
+    MatcherKind kind = MatcherKind::kPaper;
+    // Smallest disparity searched, px; may be negative. Results are absolute: left(x) matches right(x - d).
+    int min_disparity = 0;
+    int disparities = 64;  // multiple of 16, 16 .. 256
+    // Take the 15x15 mean out of both views first: without it a brightness difference of some ten grey
+    // levels between the cameras ruins the paper's cost.
+    bool normalise_local_mean = false;
+    // Sub-pixel and validity tests. Off is the paper's pure form: every pixel answered, in whole pixels.
+    bool checks = true;
+    PaperReading paper;
+    CheckLimits limits;
+};
+
+// The matcher for images of width x height, usable with up to `lanes` lanes. The arena must outlive it.
+// Throws Refusal (kConfig) for a configuration that cannot work at this size.
+std::unique_ptr<Matcher> make_matcher(const MatcherConfig& config, int width, int height, int lanes,
+                                      Arena& arena);
+
+}  // namespace groundline::stereo

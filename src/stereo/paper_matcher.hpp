@@ -1,0 +1,43 @@
+// The paper's matcher for use: equal to paper_integer.hpp bit for bit, streaming, without a cost volume.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "stereo/matcher.hpp"
+
+namespace groundline::stereo {
+
+class PaperMatcher final : public Matcher {
+  public:
+    // Rows that one task matches. Fixed, so that the split into tasks follows from the image height alone.
+    static constexpr int kBandRows = 16;
+
+    // Configuration as checked by make_matcher. `band_rows` >= 1 never changes the result.
+    PaperMatcher(const MatcherConfig& config, int width, int height, int lanes, Arena& arena,
+                 int band_rows = kBandRows);
+    ~PaperMatcher() override;
+
+    void match(ConstLuma left, ConstLuma right, const DisparityMap& out, Parallel& parallel) override;
+    std::size_t state_bytes() const override { return state_bytes_; }
+    int min_disparity() const override { return config_.min_disparity; }
+    int disparities() const override { return config_.disparities; }
+
+  private:
+    struct Lane;
+    struct Pair;
+
+    void match_band(const Pair& pair, const DisparityMap& out, int band, Lane& lane) const;
+
+    MatcherConfig config_;
+    int width_ = 0;
+    int height_ = 0;
+    int band_rows_ = 0;
+    std::vector<Lane> lanes_;
+    Luma plain_left_;  // without local mean; empty when not asked for
+    Luma plain_right_;
+    std::span<std::int32_t> patches_;  // one per pixel, for the speckle test
+    std::size_t state_bytes_ = 0;
+};
+
+}  // namespace groundline::stereo
