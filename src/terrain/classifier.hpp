@@ -1,0 +1,70 @@
+// From disparities and ground to classes, obstacles and the range up to which the ground can be certified.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "core/arena.hpp"
+#include "core/disparity.hpp"
+#include "core/fixed_vector.hpp"
+#include "core/ground.hpp"
+#include "core/parallel.hpp"
+#include "core/rectified_rig.hpp"
+#include "core/result.hpp"
+#include "core/terrain_class.hpp"
+#include "terrain/components.hpp"
+#include "terrain/config.hpp"
+
+namespace groundline::terrain {
+
+// What the ground handed to the classifier is worth.
+enum class GroundUse : std::uint8_t {
+    kNone,  // nothing: the whole mask is unknown
+    kHeld,  // an earlier frame's: obstacles and drops only, never class 1
+    kWeak,  // this frame's, degraded: class 1 only in rows that this frame's own evidence supports
+    kOwn,   // this frame's, trusted
+};
+
+// Used by one thread, which may lend it lanes. All memory is taken at construction; time is bounded by the
+// number of pixels whatever the disparities are.
+class Classifier {
+  public:
+    // `rig` has the size of the maps. Disparities searched as in GroundFinder.
+    Classifier(const TerrainConfig& config, const RectifiedRig& rig, int min_disparity, int disparities,
+               Arena& arena);
+
+    // Per pixel, with H = h (1 - d_g/d) and r the certified range of its column (the largest at which
+    // `sigmas` deviations of H on the ground, disparity noise and the fit's full covariance, are within the
+    // tolerance): obstacle where H > tolerance, drop where H < -tolerance, else traversable; beyond r
+    // obstacle where H exceeds both the tolerance and `sigmas` deviations, else unknown. Range-edge pixels
+    // are obstacles, except where the ground itself is nearer than the search range; other invalid pixels
+    // unknown. Then things, 8-connected with |delta d| <= 1 + 0.02 d: too small ones become unknown, those
+    // wholly above the clearance become unknown and are listed as overhang, the rest is listed nearest first.
+    // A ground with found == false counts as kNone. `supported_rows` has one entry per row, used for kWeak.
+    // range_limit_m is the farthest r where class 1 is possible, 0 where it is not or without metres.
+    void classify(ConstDisparityMap map, const Ground& ground, GroundUse use,
+                  std::span<const std::uint8_t> supported_rows, Mask out,
+                  FixedVector<Obstacle, kMaxObstacles>& obstacles, double& range_limit_m, Parallel& parallel);
+
+  private:
+    struct Wedge;
+
+    Wedge wedge_of(const Ground& ground) const;
+    double certify_columns(const Wedge& wedge);
+    void classify_row(ConstDisparityMap map, const Wedge& wedge, GroundUse use, bool supported, int v,
+                      Mask out) const;
+    TerrainClass beyond_range(const Wedge& wedge, int u, int v, double d_px) const;
+
+    TerrainConfig config_;
+    RectifiedRig rig_;
+    int last_disparity_;
+    int disparities_;
+    std::span<std::int32_t> certified_q4_;  // per column, the least measured disparity within its range
+    Components components_;
+};
+
+// Share of the mask's pixels in each class.
+void shares_of(ConstMask mask, std::array<double, kTerrainClasses>& share);
+
+}  // namespace groundline::terrain

@@ -1,0 +1,1 @@
+#include "terrain/ground_finder.hpp"

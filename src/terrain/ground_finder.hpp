@@ -1,0 +1,71 @@
+// From disparities to the ground: v-disparity, Hough line, robust line, robust plane with roll.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "core/arena.hpp"
+#include "core/disparity.hpp"
+#include "core/evidence.hpp"
+#include "core/ground.hpp"
+#include "core/parallel.hpp"
+#include "core/rectified_rig.hpp"
+#include "core/result.hpp"
+#include "terrain/config.hpp"
+#include "terrain/hough.hpp"
+#include "terrain/plane_fit.hpp"
+
+namespace groundline::terrain {
+
+// Used by one thread, which may lend it lanes. All memory is taken at construction.
+class GroundFinder {
+  public:
+    // `rig` has the size of the maps. Disparities searched are min_disparity .. min_disparity + disparities
+    // - 1 px. Throws Refusal for a size, a range or a gate that cannot be.
+    GroundFinder(const TerrainConfig& config, const RectifiedRig& rig, int min_disparity, int disparities,
+                 Arena& arena);
+
+    // Fills the histogram, the evidence and the ground. `prior` (calibrated rigs only, else ignored) narrows
+    // the gate to 8 deg and 30 % about a pose that was trusted a moment ago; pass nullptr when there is none
+    // or when frames with it were not believed. Ground::found only if a line was found that enough rows and
+    // pixels lie on, its pose is inside the gate and the view is not filled by something upright.
+    // Where the rig is not calibrated only the plane is given and metric is false.
+    // Deterministic for any number of lanes; no allocation.
+    void find(ConstDisparityMap map, VDisparity& v_disparity, Parallel& parallel, const GroundPose* prior,
+              GroundEvidence& evidence, Ground& ground);
+
+    // Per image row of the last frame, 1 where its own pixels lie on the ground found (at least a tenth of
+    // the valid ones, or the row is bridged by a short gap between such rows). All 0 where none was found.
+    std::span<const std::uint8_t> supported_rows() const { return supported_rows_; }
+
+  private:
+    struct RowTally;
+    struct Start;
+
+    Gate gate_for(const GroundPose* prior) const;
+    void set_line_gate(const Gate& gate);
+    bool find_line(ConstDisparityMap map, const VDisparity& v_disparity, const Gate& gate, Parallel& parallel,
+                   Start& start);
+    void shear(ConstDisparityMap map, double tan_roll, RowHistogram& histogram);
+    void tally(ConstDisparityMap map, const DisparityPlane& plane, Parallel& parallel);
+    bool inside(const DisparityPlane& plane, const Gate& gate) const;
+    bool upright(const VDisparity& v_disparity, const DisparityPlane* plane) const;
+    void weigh(ConstDisparityMap map, const DisparityPlane* plane, GroundEvidence& evidence);
+
+    static constexpr int kMaxRolls = 7;
+
+    TerrainConfig config_;
+    RectifiedRig rig_;
+    int min_disparity_;
+    int disparities_;
+    double offset_px_;  // measured minus true disparity
+    double centre_u_;
+    LineGate line_gate_;
+    std::array<Hough, kMaxRolls> hough_;
+    std::array<RowHistogram, kMaxRolls> sheared_;
+    PlaneFit plane_fit_;
+    std::span<RowTally> tally_;
+    std::span<std::uint8_t> supported_rows_;
+};
+
+}  // namespace groundline::terrain

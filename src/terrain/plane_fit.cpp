@@ -1,0 +1,1 @@
+#include "terrain/plane_fit.hpp"
