@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "stereo/matcher.hpp"
+#include "stereo/paper_integer.hpp"
 
 namespace groundline::stereo {
 
@@ -27,9 +28,14 @@ class PaperMatcher final : public Matcher {
     struct Lane;
     struct Pair;
 
-    void match_band(const Pair& pair, const DisparityMap& out, int band, Lane& lane) const;
+    void search(const Pair& pair, int first, int last, Lane& lane) const;
+    void aggregate(const Pair& pair, int k, int first, int last, Lane& lane) const;
+    void refine_and_select(int k, int first, int last, Lane& lane) const;
+    void answer_row(const std::int16_t* index, int y, const DisparityMap& out) const;
+    void judge_row(const Pair& pair, int y, bool fresh, int row, Lane& lane, const DisparityMap& out) const;
 
     MatcherConfig config_;
+    WindowTaps taps_;
     int width_ = 0;
     int height_ = 0;
     int band_rows_ = 0;

@@ -1,0 +1,48 @@
+#include "stereo/matcher.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <string>
+
+#include "core/error.hpp"
+#include "stereo/paper_matcher.hpp"
+
+namespace groundline::stereo {
+namespace {
+
+void refuse(const std::string& sentence) {
+    throw Refusal(ExitStatus::kConfig, sentence);
+}
+
+void check(const MatcherConfig& config, int width, int height) {
+    constexpr int kWindow = 2 * kWindowReach + 1;
+    const std::string size = std::to_string(width) + "x" + std::to_string(height);
+    if (width < kWindow || height < kWindow)
+        refuse("images of " + size + " px are too small to match: at least 11x11 px are needed");
+    if (config.disparities < 16 || config.disparities > 256 || config.disparities % 16 != 0)
+        refuse("the number of disparities is " + std::to_string(config.disparities) +
+               "; it must be a multiple of 16 from 16 to 256");
+    const long first = config.min_disparity;
+    const long last = first + config.disparities - 1;
+    if (std::max(std::labs(first), std::labs(last)) >= width)
+        refuse("disparities " + std::to_string(first) + " to " + std::to_string(last) +
+               " px cannot be searched in images of " + size +
+               " px: each must be smaller than the width; lower the number of disparities");
+    if (last > 2046 || first < -2046)
+        refuse("disparities " + std::to_string(first) + " to " + std::to_string(last) +
+               " px do not fit the result: they must stay within -2046 to 2046");
+    const int highest = config.paper.rule_one == RuleOne::kSum9 ? 14 : 28;
+    if (config.paper.truncation < 1 || config.paper.truncation > highest)
+        refuse("the truncation of the paper's cost is " + std::to_string(config.paper.truncation) +
+               " grey levels; it must be 1 to " + std::to_string(highest));
+}
+
+}  // namespace
+
+std::unique_ptr<Matcher> make_matcher(const MatcherConfig& config, int width, int height, int lanes,
+                                      Arena& arena) {
+    check(config, width, height);
+    return std::make_unique<PaperMatcher>(config, width, height, lanes, arena);
+}
+
+}  // namespace groundline::stereo
