@@ -1,0 +1,150 @@
+#include "pipeline/pipeline.hpp"
+
+#include <pthread.h>
+#include <time.h>
+
+#include <thread>
+
+#include "core/clock.hpp"
+#include "pipeline/pacer.hpp"
+#include "pipeline/ring.hpp"
+#include "pipeline/triple_buffer.hpp"
+
+namespace groundline::pipeline {
+namespace {
+
+// A lossless run keeps this many pairs in flight: enough to keep decoding, matching and writing busy at once.
+constexpr std::size_t kRingSlots = 3;
+// How long a sleeping capture thread takes at most to see a stop.
+constexpr std::int64_t kLongestSleepNs = 50'000'000;
+
+template <typename Slot, typename Make>
+std::unique_ptr<HandOver<Slot>> make_hand_over(bool lossless, Make make) {
+    static_assert(kRingSlots == 3);
+    const std::array<Slot, 3> slots = {make(), make(), make()};
+    if (lossless) return std::make_unique<Ring<Slot, kRingSlots>>(slots);
+    return std::make_unique<TripleBuffer<Slot>>(slots);
+}
+
+void sleep_until(std::int64_t due_mono_ns, const std::atomic<bool>& stop) {
+    for (std::int64_t now = now_mono_ns(); now < due_mono_ns && !stop.load(std::memory_order_relaxed);
+         now = now_mono_ns()) {
+        const std::int64_t wake = std::min(due_mono_ns, now + kLongestSleepNs);
+        const timespec until{static_cast<time_t>(wake / 1'000'000'000),
+                             static_cast<long>(wake % 1'000'000'000)};
+        clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr);
+    }
+}
+
+void name_this_thread(const char* name) {
+    pthread_setname_np(pthread_self(), name);
+}
+
+}  // namespace
+
+Pipeline::Pipeline(FrameSource& source, Processor& processor, std::span<const SinkSlot> sinks, bool lossless,
+                   Arena& arena, Counters& counters)
+    : source_(source), processor_(processor), sinks_(sinks), counters_(counters) {
+    const SourceInfo& info = source.info();
+    captured_ = make_hand_over<CaptureSlot>(lossless, [&] {
+        return CaptureSlot{StereoFrame::make(arena, info.width, info.height, info.colour)};
+    });
+    finished_ =
+        make_hand_over<ResultSlot>(lossless, [&] { return ResultSlot{processor.make_result(arena)}; });
+}
+
+Pipeline::~Pipeline() = default;
+
+void Pipeline::run(const RunOptions& options, const std::atomic<bool>& stop, BadPair on_bad,
+                   RunReport& report) {
+    std::jthread sinks([&] {
+        name_this_thread("gl-sinks");
+        deliver(report);
+    });
+    std::jthread processing([&] {
+        name_this_thread("gl-process");
+        process(report);
+    });
+    name_this_thread("gl-capture");
+    capture(options, stop, on_bad, report);
+    name_this_thread("groundline");
+    captured_->end_of_stream();
+    processing.join();
+    sinks.join();
+    counters_.add(Count::kFramesOverwritten, captured_->overwritten());
+    counters_.add(Count::kResultsOverwritten, finished_->overwritten());
+}
+
+void Pipeline::capture(const RunOptions& options, const std::atomic<bool>& stop, BadPair on_bad,
+                       RunReport& report) {
+    Pacer pacer(options.pace == Pace::kFixed ? static_cast<std::int64_t>(1e9 / options.rate_hz) : 0);
+    std::int64_t taken = 0;
+    while (options.frames < 0 || taken < options.frames) {
+        if (stop.load(std::memory_order_relaxed)) {
+            report.interrupted = true;
+            return;
+        }
+        CaptureSlot* slot = captured_->begin_write();
+        if (slot == nullptr) return;
+        const std::int64_t begin_ns = now_mono_ns();
+        const Pull pull = source_.next(slot->frame);
+        slot->read_ns = now_mono_ns() - begin_ns;
+        if (pull == Pull::kEnd) {
+            report.source_error = source_.error();
+            if (!report.source_error.empty() || !options.loop || !source_.rewind()) return;
+            continue;
+        }
+        ++taken;
+        if (pull == Pull::kBad) {
+            counters_.add(Count::kFramesBad);
+            on_bad(slot->frame.stamp, source_.error());
+            continue;
+        }
+        if (options.pace != Pace::kMax)
+            sleep_until(pacer.due_ns(slot->frame.stamp.exposure_mono_ns, now_mono_ns()), stop);
+        slot->arrival_mono_ns = now_mono_ns();
+        counters_.add(Count::kFramesRead);
+        captured_->commit();
+    }
+}
+
+void Pipeline::process(RunReport& report) {
+    while (CaptureSlot* captured = captured_->take()) {
+        ResultSlot* finished = finished_->begin_write();
+        if (finished == nullptr) break;
+        processor_.process(captured->frame, finished->result);
+        finished->arrival_mono_ns = captured->arrival_mono_ns;
+        StageTimes& times = finished->result.times_ns;
+        times[static_cast<std::size_t>(Stage::kRead)] = captured->read_ns;
+        for (const Stage stage :
+             {Stage::kRead, Stage::kRectify, Stage::kMatch, Stage::kGround, Stage::kClassify})
+            report.stages[static_cast<std::size_t>(stage)].add(times[static_cast<std::size_t>(stage)]);
+        counters_.add(Count::kFramesProcessed);
+        captured_->release();
+        finished_->commit();
+    }
+    finished_->end_of_stream();
+}
+
+void Pipeline::deliver(RunReport& report) {
+    while (ResultSlot* finished = finished_->take()) {
+        for (const SinkSlot& slot : sinks_) {
+            const std::int64_t begin_ns = now_mono_ns();
+            if (!slot.sink->consume(finished->result)) {
+                counters_.add(Count::kSinkFailures);
+                if (slot.required) {
+                    report.sink_error = slot.sink->error();
+                    finished_->close();
+                    captured_->close();
+                    return;
+                }
+            }
+            report.stages[static_cast<std::size_t>(slot.stage)].add(now_mono_ns() - begin_ns);
+        }
+        report.latency.add(now_mono_ns() - finished->arrival_mono_ns);
+        counters_.add(Count::kResultsDelivered);
+        finished_->release();
+    }
+}
+
+}  // namespace groundline::pipeline

@@ -1,0 +1,112 @@
+#include "pipeline/processor.hpp"
+
+#include "core/clock.hpp"
+#include "rig/photometric.hpp"
+#include "terrain/v_disparity.hpp"
+
+namespace groundline::pipeline {
+namespace {
+
+// Adds the time since it was made, or since the last call, to a stage.
+class StageClock {
+  public:
+    explicit StageClock(StageTimes& times) : times_(times), last_ns_(now_mono_ns()) {}
+    void end(Stage stage) {
+        const std::int64_t now_ns = now_mono_ns();
+        times_[static_cast<std::size_t>(stage)] = now_ns - last_ns_;
+        last_ns_ = now_ns;
+    }
+
+  private:
+    StageTimes& times_;
+    std::int64_t last_ns_;
+};
+
+}  // namespace
+
+Processor::Processor(const ProcessorConfig& config, const rig::Rectifier& rectifier, Parallel& parallel,
+                     Arena& arena)
+    : config_(config),
+      rectifier_(rectifier),
+      parallel_(parallel),
+      matcher_(stereo::make_matcher(config.matcher, rectifier.rig().width, rectifier.rig().height,
+                                    parallel.lanes(), arena)),
+      ground_finder_(config.terrain, rectifier.rig(), matcher_->min_disparity(), matcher_->disparities(),
+                     arena),
+      classifier_(config.terrain, rectifier.rig(), matcher_->min_disparity(), matcher_->disparities(), arena),
+      sector_finder_(config.terrain, rectifier.rig(), matcher_->min_disparity(), matcher_->disparities(),
+                     arena),
+      right_(arena.image<std::uint8_t>(rectifier.rig().width, rectifier.rig().height)) {}
+
+FrameResult Processor::make_result(Arena& arena) const {
+    const RectifiedRig& rig = rectifier_.rig();
+    FrameResult result;
+    result.rig = rig;
+    result.tolerance_m = rig.calibrated ? config_.terrain.tolerance_up_m : 0.0;
+    result.tolerance_ratio = rig.calibrated ? 0.0 : config_.terrain.tolerance_ratio;
+    result.left = arena.image<std::uint8_t>(rig.width, rig.height);
+    if (config_.colour) result.left_bgr = arena.bgr_image(rig.width, rig.height);
+    result.disparity = DisparityMap::make(arena, rig.width, rig.height);
+    result.mask = arena.image<TerrainClass>(rig.width, rig.height);
+    result.v_disparity =
+        terrain::make_v_disparity(arena, rig.height, matcher_->min_disparity(), matcher_->disparities());
+    return result;
+}
+
+void Processor::process(const StereoFrame& frame, FrameResult& result) {
+    StageClock clock(result.times_ns);
+    const RectifiedRig& rig = rectifier_.rig();
+    result.stamp = frame.stamp;
+
+    rectifier_.rectify(frame, result.left, right_, result.left_bgr, parallel_);
+    Evidence& evidence = result.evidence;
+    evidence = {};
+    evidence.calibrated = rig.calibrated;
+    evidence.mount_prior = config_.terrain.mount_known;
+    evidence.skew_ns = frame.stamp.skew_ns;
+    evidence.photometric = rig::measure_photometric(result.left, right_, parallel_);
+    clock.end(Stage::kRectify);
+
+    matcher_->match(result.left, right_, result.disparity, parallel_);
+    mark_pixels_without_source(result.disparity);
+    clock.end(Stage::kMatch);
+
+    ground_finder_.find(result.disparity, result.v_disparity, parallel_, nullptr, evidence.ground_fit,
+                        evidence.ground);
+    const verdict::Decision decision =
+        verdict::decide(evidence, state_, frame.stamp.exposure_mono_ns, config_.limits);
+    state_ = verdict::next_state(decision, state_, frame.stamp.exposure_mono_ns, config_.limits);
+    result.verdict = decision.verdict;
+    result.reasons = decision.reasons;
+    result.ground = decision.ground;
+    clock.end(Stage::kGround);
+
+    classifier_.classify(result.disparity, result.ground, decision.use, ground_finder_.supported_rows(),
+                         result.mask, result.obstacles, result.range_limit_m, parallel_);
+    sector_finder_.find(result.disparity, result.ground, result.mask, result.sectors);
+    terrain::shares_of(result.mask, result.share);
+    clock.end(Stage::kClassify);
+}
+
+// What was matched from or to a pixel that rectification could not fill is no match.
+void Processor::mark_pixels_without_source(const DisparityMap& map) {
+    const ConstImageView<std::uint8_t> left = rectifier_.outside_left();
+    const ConstImageView<std::uint8_t> right = rectifier_.outside_right();
+    if (left.empty() && right.empty()) return;
+    for (int y = 0; y < map.height(); ++y) {
+        std::int16_t* disparity = map.disparity_q4.row(y);
+        Invalid* invalid = map.invalid.row(y);
+        for (int x = 0; x < map.width(); ++x) {
+            if (invalid[x] != Invalid::kNone) continue;
+            const int matched = x - (disparity[x] + kDisparityOne / 2) / kDisparityOne;
+            const bool no_left = !left.empty() && left.at(x, y) != 0;
+            const bool no_right =
+                !right.empty() && matched >= 0 && matched < map.width() && right.at(matched, y) != 0;
+            if (!no_left && !no_right) continue;
+            invalid[x] = Invalid::kNoImage;
+            disparity[x] = 0;
+        }
+    }
+}
+
+}  // namespace groundline::pipeline

@@ -1,0 +1,58 @@
+// What happens to one pair: rectify, match, find the ground, decide, classify. The heart of the pipeline.
+#pragma once
+
+#include <memory>
+
+#include "core/arena.hpp"
+#include "core/frame.hpp"
+#include "core/parallel.hpp"
+#include "core/result.hpp"
+#include "rig/rectifier.hpp"
+#include "stereo/matcher.hpp"
+#include "terrain/classifier.hpp"
+#include "terrain/config.hpp"
+#include "terrain/ground_finder.hpp"
+#include "terrain/sectors.hpp"
+#include "verdict/verdict.hpp"
+
+namespace groundline::pipeline {
+
+struct ProcessorConfig {
+    stereo::MatcherConfig matcher;
+    terrain::TerrainConfig terrain;
+    verdict::Limits limits;
+    bool colour = false;  // the source has colour and a sink draws it
+};
+
+// Holds the state of one camera pair. Used by one thread, which lends it the lanes of `parallel`. The result
+// is a function of the pairs given so far with their stamps and the configuration: of nothing else.
+class Processor {
+  public:
+    // All working memory comes from `arena`. Borrows rectifier and parallel. Throws Refusal for a
+    // configuration that cannot work at this size.
+    Processor(const ProcessorConfig& config, const rig::Rectifier& rectifier, Parallel& parallel,
+              Arena& arena);
+
+    // Memory for one result of this processor.
+    FrameResult make_result(Arena& arena) const;
+
+    // Writes all of `result`, its stage times included. No allocation, no exception.
+    void process(const StereoFrame& frame, FrameResult& result);
+
+    const stereo::Matcher& matcher() const { return *matcher_; }
+
+  private:
+    void mark_pixels_without_source(const DisparityMap& map);
+
+    ProcessorConfig config_;
+    const rig::Rectifier& rectifier_;
+    Parallel& parallel_;
+    std::unique_ptr<stereo::Matcher> matcher_;
+    terrain::GroundFinder ground_finder_;
+    terrain::Classifier classifier_;
+    terrain::SectorFinder sector_finder_;
+    Luma right_;
+    verdict::State state_;
+};
+
+}  // namespace groundline::pipeline

@@ -1,0 +1,293 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "core/error.hpp"
+#include "core/result.hpp"
+#include "settings/edit_distance.hpp"
+#include "settings/key.hpp"
+#include "settings/settings.hpp"
+
+namespace groundline::settings {
+namespace {
+
+bool parse_number(std::string_view text, double& value) {
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    return error == std::errc{} && end == text.data() + text.size() && std::isfinite(value);
+}
+
+bool parse_whole(std::string_view text, int& value) {
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    return error == std::errc{} && end == text.data() + text.size();
+}
+
+// In each builder `member` maps Settings& to the member's reference, const or not.
+template <typename Member>
+Key number(std::string name, double low, double high, std::string help, Member member) {
+    Key key{std::move(name), fmt::format("{} .. {}", low, high), std::move(help)};
+    key.parse = [=](Settings& settings, std::string_view text) {
+        double value = 0.0;
+        if (!parse_number(text, value) || value < low || value > high) return false;
+        member(settings) = value;
+        return true;
+    };
+    key.print = [=](const Settings& settings) { return fmt::format("{}", member(settings)); };
+    return key;
+}
+
+template <typename Member>
+Key whole(std::string name, int low, int high, std::string help, Member member) {
+    Key key{std::move(name), fmt::format("{} .. {}", low, high), std::move(help)};
+    key.parse = [=](Settings& settings, std::string_view text) {
+        int value = 0;
+        if (!parse_whole(text, value) || value < low || value > high) return false;
+        member(settings) = value;
+        return true;
+    };
+    key.print = [=](const Settings& settings) { return fmt::format("{}", member(settings)); };
+    return key;
+}
+
+// One of a few words, each standing for a value.
+template <typename Value, typename Member>
+Key choice(std::string name, std::vector<std::pair<std::string, Value>> words, std::string help,
+           Member member) {
+    std::string range;
+    for (const auto& [word, value] : words)
+        range += (range.empty() ? "" : " | ") + word;
+    Key key{std::move(name), range, std::move(help)};
+    key.parse = [=](Settings& settings, std::string_view text) {
+        const auto found =
+            std::find_if(words.begin(), words.end(), [&](const auto& w) { return w.first == text; });
+        if (found == words.end()) return false;
+        member(settings) = found->second;
+        return true;
+    };
+    key.print = [=](const Settings& settings) {
+        const auto found = std::find_if(words.begin(), words.end(),
+                                        [&](const auto& w) { return w.second == member(settings); });
+        return found == words.end() ? std::string{} : found->first;
+    };
+    return key;
+}
+
+template <typename Member>
+Key on_off(std::string name, std::string help, Member member) {
+    Key key = choice<bool>(std::move(name), {{"on", true}, {"off", false}}, std::move(help), member);
+    // YAML writes the same two words in several ways.
+    const auto words = key.parse;
+    key.parse = [words](Settings& settings, std::string_view text) {
+        if (text == "true" || text == "yes") return words(settings, "on");
+        if (text == "false" || text == "no") return words(settings, "off");
+        return words(settings, text);
+    };
+    return key;
+}
+
+template <typename Member>
+Key text(std::string name, std::string range, std::string help, Member member) {
+    Key key{std::move(name), std::move(range), std::move(help)};
+    key.parse = [=](Settings& settings, std::string_view value) {
+        member(settings) = std::string(value);
+        return true;
+    };
+    key.print = [=](const Settings& settings) { return member(settings); };
+    return key;
+}
+
+// A number that may be left unset; `unset` is its printed and accepted word for that.
+template <typename Member>
+Key optional_number(std::string name, double low, double high, std::string help, Member member) {
+    Key key{std::move(name), fmt::format("unset | {} .. {}", low, high), std::move(help)};
+    key.parse = [=](Settings& settings, std::string_view word) {
+        if (word == "unset") {
+            member(settings).reset();
+            return true;
+        }
+        double value = 0.0;
+        if (!parse_number(word, value) || value < low || value > high) return false;
+        member(settings) = value;
+        return true;
+    };
+    key.print = [=](const Settings& settings) {
+        return member(settings) ? fmt::format("{}", *member(settings)) : std::string("unset");
+    };
+    return key;
+}
+
+Key disparities_key() {
+    Key key{"stereo.disparities", "auto | a multiple of 16 from 16 to 256",
+            "Disparities searched; auto: the data set's own count if given, else a sixth of the width."};
+    key.parse = [](Settings& settings, std::string_view word) {
+        settings.auto_disparities = word == "auto";
+        if (settings.auto_disparities) return true;
+        int value = 0;
+        if (!parse_whole(word, value) || value < 16 || value > 256 || value % 16 != 0) return false;
+        settings.matcher.disparities = value;
+        return true;
+    };
+    key.print = [](const Settings& settings) {
+        return settings.auto_disparities ? std::string("auto")
+                                         : fmt::format("{}", settings.matcher.disparities);
+    };
+    return key;
+}
+
+Key tolerance_key() {
+    Key key = number(
+        "terrain.tolerance_m", 0.01, 2.0, "Height and depth that the robot drives over.",
+        [](auto& settings) -> auto& { return settings.terrain.tolerance_up_m; });
+    const auto parse_up = key.parse;
+    key.parse = [parse_up](Settings& settings, std::string_view word) {
+        if (!parse_up(settings, word)) return false;
+        settings.terrain.tolerance_down_m = settings.terrain.tolerance_up_m;
+        return true;
+    };
+    return key;
+}
+
+// Written once for const and mutable settings.
+#define GROUNDLINE_MEMBER(path)   \
+    [](auto& settings) -> auto& { \
+        return settings.path;     \
+    }
+
+std::vector<Key> make_keys() {
+    using stereo::MatcherKind;
+    using stereo::RuleOne;
+    using stereo::RuleTwo;
+    using stereo::Window;
+    using terrain::Band;
+    using terrain::LineMode;
+    std::vector<Key> keys;
+    keys.push_back(choice<MatcherKind>("stereo.matcher", {{"paper", MatcherKind::kPaper}},
+                                       "How the pair is matched.", GROUNDLINE_MEMBER(matcher.kind)));
+    keys.push_back(disparities_key());
+    keys.push_back(whole("stereo.min_disparity", -128, 256, "Smallest disparity searched.",
+                         GROUNDLINE_MEMBER(matcher.min_disparity)));
+    keys.push_back(choice<bool>("stereo.normalise", {{"off", false}, {"local_mean", true}},
+                                "What is taken out of both views before matching; without it the paper's "
+                                "matcher fails where the cameras differ in brightness.",
+                                GROUNDLINE_MEMBER(matcher.normalise_local_mean)));
+    keys.push_back(on_off(
+        "stereo.checks", "Sub-pixel and validity checks; off is the paper's pure form, every pixel answered.",
+        GROUNDLINE_MEMBER(matcher.checks)));
+    keys.push_back(on_off("stereo.subpixel", "With checks: refine to 1/16 px.",
+                          GROUNDLINE_MEMBER(matcher.limits.subpixel)));
+    keys.push_back(
+        whole("stereo.texture", 0, 100000,
+              "With checks: least sum of horizontal grey-level steps in the 11x11 window; 0 is off.",
+              GROUNDLINE_MEMBER(matcher.limits.texture)));
+    keys.push_back(whole("stereo.saturated_percent", 0, 100,
+                         "With checks: most percent of the window at black or white; 100 is off.",
+                         GROUNDLINE_MEMBER(matcher.limits.saturated_percent)));
+    keys.push_back(whole("stereo.cost_percent", 0, 100,
+                         "With checks: highest cost of an answer, percent of the truncation; 100 is off.",
+                         GROUNDLINE_MEMBER(matcher.limits.cost_percent)));
+    keys.push_back(whole("stereo.uniqueness_percent", -1, 100,
+                         "With checks: by how much the second-best match must be worse; -1 is off.",
+                         GROUNDLINE_MEMBER(matcher.limits.uniqueness_percent)));
+    keys.push_back(whole("stereo.left_right_px", -1, 16,
+                         "With checks: most difference to the match from the right view; -1 is off.",
+                         GROUNDLINE_MEMBER(matcher.limits.left_right_px)));
+    keys.push_back(whole("stereo.speckle_px", 0, 100000,
+                         "With checks: patches with fewer pixels are not believed; 0 is off.",
+                         GROUNDLINE_MEMBER(matcher.limits.speckle_px)));
+    keys.push_back(choice<RuleOne>(
+        "stereo.rule_one", {{"mean9", RuleOne::kMean9}, {"sum9", RuleOne::kSum9}, {"off", RuleOne::kOff}},
+        "Reading of the paper's first rule.", GROUNDLINE_MEMBER(matcher.paper.rule_one)));
+    keys.push_back(choice<RuleTwo>("stereo.rule_two",
+                                   {{"seven_of_eight", RuleTwo::kSevenOfEight},
+                                    {"seven_of_nine", RuleTwo::kSevenOfNine},
+                                    {"off", RuleTwo::kOff}},
+                                   "Reading of the paper's second rule.",
+                                   GROUNDLINE_MEMBER(matcher.paper.rule_two)));
+    keys.push_back(on_off("stereo.rules_at_once",
+                          "The second rule judges the costs from before the first, not from after it.",
+                          GROUNDLINE_MEMBER(matcher.paper.rules_at_once)));
+    keys.push_back(choice<Window>(
+        "stereo.window", {{"gauss5", Window::kGauss5}, {"gauss5.5", Window::kGauss55}, {"box", Window::kBox}},
+        "Weights of the 11x11 window: sigma 5/3 (the paper's), 5.5/3, or equal.",
+        GROUNDLINE_MEMBER(matcher.paper.window)));
+    keys.push_back(whole("stereo.truncation", 1, 28,
+                         "Most grey levels that one pixel adds to a cost; the paper's 4 % are 10.",
+                         GROUNDLINE_MEMBER(matcher.paper.truncation)));
+
+    keys.push_back(tolerance_key());
+    keys.push_back(number("terrain.tolerance_ratio", 0.01, 0.9,
+                          "The same as a share of the camera height, used where there is no calibration.",
+                          GROUNDLINE_MEMBER(terrain.tolerance_ratio)));
+    keys.push_back(number("terrain.clearance_m", 0.1, 100.0,
+                          "What hangs wholly above this height is no obstacle.",
+                          GROUNDLINE_MEMBER(terrain.clearance_m)));
+    keys.push_back(choice<Band>("terrain.band",
+                                {{"off", Band::kOff},
+                                 {"50rows", Band::k50Rows},
+                                 {"50px", Band::k50Px},
+                                 {"50disp8", Band::k50Disparity8}},
+                                "The paper's parallel band instead of a height in metres, and its unit.",
+                                GROUNDLINE_MEMBER(terrain.band)));
+    keys.push_back(
+        choice<LineMode>("terrain.line", {{"votes", LineMode::kVotes}, {"longest", LineMode::kLongest}},
+                         "How the ground line is chosen: most votes, or the paper's longest segment.",
+                         GROUNDLINE_MEMBER(terrain.line)));
+    keys.push_back(number("terrain.stopping_distance_m", 0.0, 100.0, "Distance the robot needs to stop.",
+                          GROUNDLINE_MEMBER(terrain.stopping_distance_m)));
+    keys.push_back(whole("terrain.sectors", 1, static_cast<int>(kMaxSectors),
+                         "Bearing sectors the field of view is cut into.",
+                         GROUNDLINE_MEMBER(terrain.sectors)));
+
+    keys.push_back(optional_number("mount.height_m", 0.05, 20.0,
+                                   "Height of the left camera above the ground.",
+                                   GROUNDLINE_MEMBER(mount.height_m)));
+    keys.push_back(optional_number("mount.pitch_deg", -30.0, 80.0, "Pitch of the camera, positive nose down.",
+                                   GROUNDLINE_MEMBER(mount.pitch_deg)));
+    keys.push_back(optional_number("mount.roll_deg", -45.0, 45.0,
+                                   "Roll of the camera, positive where the ground leans to the right.",
+                                   GROUNDLINE_MEMBER(mount.roll_deg)));
+    keys.push_back(number("mount.x_m", -50.0, 50.0, "Left camera before the robot's origin.",
+                          GROUNDLINE_MEMBER(mount.x_m)));
+    keys.push_back(number("mount.y_m", -50.0, 50.0, "Left camera to the left of the robot's origin.",
+                          GROUNDLINE_MEMBER(mount.y_m)));
+    keys.push_back(number("mount.yaw_deg", -180.0, 180.0, "Where the camera looks, positive to the left.",
+                          GROUNDLINE_MEMBER(mount.yaw_deg)));
+
+    keys.push_back(text("publish.url", "an LCM URL",
+                        "LCM provider; empty: LCM_DEFAULT_URL, else the library's.",
+                        GROUNDLINE_MEMBER(publish.url)));
+    keys.push_back(text("publish.prefix", "a word", "In front of every channel name.",
+                        GROUNDLINE_MEMBER(publish.prefix)));
+    keys.push_back(on_off("publish.v_disparity", "Publish the v-disparity image too.",
+                          GROUNDLINE_MEMBER(publish.v_disparity)));
+    keys.push_back(on_off("publish.preview", "Publish a small picture of the left view too.",
+                          GROUNDLINE_MEMBER(publish.preview)));
+    return keys;
+}
+
+#undef GROUNDLINE_MEMBER
+
+}  // namespace
+
+const std::vector<Key>& keys() {
+    static const std::vector<Key> table = make_keys();
+    return table;
+}
+
+const Key* find_key(std::string_view name) {
+    const auto found =
+        std::find_if(keys().begin(), keys().end(), [&](const Key& key) { return key.name == name; });
+    return found == keys().end() ? nullptr : &*found;
+}
+
+std::string nearest_key(std::string_view name) {
+    const auto nearest = std::min_element(keys().begin(), keys().end(), [&](const Key& a, const Key& b) {
+        return edit_distance(a.name, name) < edit_distance(b.name, name);
+    });
+    return nearest->name;
+}
+
+}  // namespace groundline::settings

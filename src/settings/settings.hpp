@@ -1,0 +1,62 @@
+// Everything that can be configured, and the ways it is set: a file, key=value words, defaults.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "stereo/matcher.hpp"
+#include "terrain/config.hpp"
+#include "verdict/verdict.hpp"
+
+namespace groundline::settings {
+
+// How the camera sits on the robot, where it was measured. Body frame: x forward, y left.
+struct MountSettings {
+    std::optional<double> height_m;
+    std::optional<double> pitch_deg;  // nose down is positive
+    std::optional<double> roll_deg;
+    double x_m = 0.0;
+    double y_m = 0.0;
+    double yaw_deg = 0.0;  // positive to the left
+};
+
+struct PublishSettings {
+    std::string url;                     // empty: LCM_DEFAULT_URL, else the library's default
+    std::string prefix = "GROUNDLINE_";  // of every channel
+    bool v_disparity = false;
+    bool preview = false;
+};
+
+// Const while a pipeline runs. Defaults are the member initialisers here and in the rooms' own structs.
+struct Settings {
+    stereo::MatcherConfig matcher;
+    bool auto_disparities = true;    // stereo.disparities: auto
+    terrain::TerrainConfig terrain;  // without the mount: see terrain_config()
+    MountSettings mount;
+    PublishSettings publish;
+};
+
+// Reads a YAML file of keys, nested (`stereo: {matcher: paper}`) or dotted (`stereo.matcher: paper`), over
+// what `settings` holds. Throws Refusal: kInput when the file cannot be read; kConfig with file, line and the
+// nearest known key for an unknown key, the accepted range for a bad value, and for malformed YAML.
+void load_file(Settings& settings, const std::filesystem::path& file);
+
+// Sets one key from a `key=value` word of the command line. Throws Refusal(kConfig) likewise.
+void set_word(Settings& settings, std::string_view word);
+
+// What the rooms get: the terrain with the mount and its gate, the verdict's limits that fit the matcher.
+// Throws Refusal(kConfig) for half a mount (height without pitch or the other way round).
+terrain::TerrainConfig terrain_config(const Settings& settings);
+verdict::Limits verdict_limits(const Settings& settings);
+
+// Every key with its value in force, in the table's order.
+std::vector<std::pair<std::string, std::string>> in_force(const Settings& settings);
+
+// The sample configuration: every key commented out at its default, with help, unit and range.
+std::string sample_file();
+
+}  // namespace groundline::settings

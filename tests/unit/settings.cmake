@@ -1,0 +1,1 @@
+groundline_test(settings SOURCES unit/settings_test.cpp USES settings)

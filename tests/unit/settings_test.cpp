@@ -1,0 +1,170 @@
+// The key table: every key settable and printable, refusals that name line and nearest key, the sample file.
+#include "settings/settings.hpp"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <set>
+#include <sstream>
+
+#include "core/error.hpp"
+#include "settings/edit_distance.hpp"
+#include "settings/key.hpp"
+
+namespace groundline::settings {
+namespace {
+
+class SettingsFile : public testing::Test {
+  protected:
+    std::filesystem::path write(const std::string& text) {
+        std::ofstream(path_) << text;
+        return path_;
+    }
+    void TearDown() override { std::filesystem::remove(path_); }
+
+    std::filesystem::path path_ = std::filesystem::path(testing::TempDir()) /
+                                  (std::string("groundline_") +
+                                   testing::UnitTest::GetInstance()->current_test_info()->name() + ".yaml");
+};
+
+// The refusal of `action`, which must come.
+template <typename Action>
+std::string refusal(Action action, ExitStatus expected) {
+    try {
+        action();
+    } catch (const Refusal& refused) {
+        EXPECT_EQ(refused.status(), expected) << refused.what();
+        return refused.what();
+    }
+    ADD_FAILURE() << "nothing was refused";
+    return {};
+}
+
+TEST(Keys, NamesAreUniqueAndEachDefaultIsAccepted) {
+    std::set<std::string> names;
+    for (const Key& key : keys()) {
+        EXPECT_TRUE(names.insert(key.name).second) << key.name;
+        EXPECT_FALSE(key.help.empty()) << key.name;
+        Settings settings;
+        const std::string value = key.print(settings);
+        EXPECT_TRUE(key.parse(settings, value)) << key.name << "=" << value;
+        EXPECT_EQ(key.print(settings), value) << key.name;
+    }
+}
+
+TEST(Keys, ContractNamesAndDefaultsHold) {
+    const Settings defaults;
+    const auto value = [&](const char* name) {
+        const Key* key = find_key(name);
+        return key == nullptr ? std::string("missing") : key->print(defaults);
+    };
+    EXPECT_EQ(value("stereo.disparities"), "auto");
+    EXPECT_EQ(value("stereo.min_disparity"), "0");
+    EXPECT_EQ(value("stereo.normalise"), "off");
+    EXPECT_EQ(value("stereo.checks"), "on");
+    EXPECT_EQ(value("terrain.tolerance_m"), "0.2");
+    EXPECT_EQ(value("terrain.tolerance_ratio"), "0.15");
+    EXPECT_EQ(value("terrain.clearance_m"), "2");
+    EXPECT_EQ(value("terrain.band"), "off");
+    EXPECT_EQ(value("terrain.stopping_distance_m"), "2");
+    for (const char* name : {"mount.height_m", "mount.pitch_deg", "mount.roll_deg"})
+        EXPECT_EQ(value(name), "unset") << name;
+}
+
+TEST(Words, SetTheValueOrSayWhatWasExpected) {
+    Settings settings;
+    set_word(settings, "stereo.disparities=128");
+    EXPECT_EQ(settings.matcher.disparities, 128);
+    EXPECT_FALSE(settings.auto_disparities);
+    set_word(settings, "terrain.tolerance_m=0.1");
+    EXPECT_EQ(settings.terrain.tolerance_up_m, 0.1);
+    EXPECT_EQ(settings.terrain.tolerance_down_m, 0.1);
+    set_word(settings, "stereo.normalise=local_mean");
+    EXPECT_TRUE(settings.matcher.normalise_local_mean);
+    set_word(settings, "stereo.checks=off");
+    EXPECT_FALSE(settings.matcher.checks);
+
+    for (const char* word : {"stereo.disparities=100", "stereo.disparities=272", "stereo.disparities=",
+                             "terrain.tolerance_m=nan", "terrain.tolerance_m=-1", "terrain.tolerance_m=1e99",
+                             "terrain.tolerance_m=0.2m", "stereo.matcher=magic", "stereo.checks=perhaps"})
+        refusal([&] { set_word(settings, word); }, ExitStatus::kConfig);
+    const std::string unknown =
+        refusal([&] { set_word(settings, "stereo.mathcer=paper"); }, ExitStatus::kConfig);
+    EXPECT_NE(unknown.find("stereo.mathcer"), std::string::npos) << unknown;
+    EXPECT_NE(unknown.find("'stereo.matcher'"), std::string::npos) << unknown;
+    refusal([&] { set_word(settings, "stereo.matcher"); }, ExitStatus::kUsage);
+}
+
+TEST_F(SettingsFile, NestedAndDottedKeysMeanTheSame) {
+    Settings nested;
+    load_file(nested, write("stereo:\n  matcher: paper\n  normalise: local_mean\nterrain: {band: 50rows}\n"));
+    Settings dotted;
+    load_file(dotted, write("stereo.matcher: paper\nstereo.normalise: local_mean\nterrain.band: 50rows\n"));
+    EXPECT_EQ(in_force(nested), in_force(dotted));
+    EXPECT_NE(in_force(nested), in_force(Settings{}));
+}
+
+TEST_F(SettingsFile, UnknownKeyNamesLineAndNearest) {
+    Settings settings;
+    const auto file = write("stereo:\n  matcher: paper\n\n  normalize: local_mean\n");
+    const std::string sentence = refusal([&] { load_file(settings, file); }, ExitStatus::kConfig);
+    EXPECT_NE(sentence.find(file.string() + ":4"), std::string::npos) << sentence;
+    EXPECT_NE(sentence.find("'stereo.normalise'"), std::string::npos) << sentence;
+}
+
+TEST_F(SettingsFile, WhatIsNotAConfigurationIsRefused) {
+    Settings settings;
+    refusal([&] { load_file(settings, "/nonexistent/groundline.yaml"); }, ExitStatus::kInput);
+    refusal([&] { load_file(settings, testing::TempDir()); }, ExitStatus::kInput);
+    for (const char* text : {"- a\n- b\n", "stereo: [1, 2]\n", "stereo:\n  matcher: {a: [\n", "just words\n",
+                             "terrain:\n  tolerance_m: .nan\n", "terrain.tolerance_m:\n"})
+        refusal([&] { load_file(settings, write(text)); }, ExitStatus::kConfig);
+}
+
+TEST_F(SettingsFile, AnEmptyFileChangesNothing) {
+    Settings settings;
+    load_file(settings, write("# nothing yet\n"));
+    EXPECT_EQ(in_force(settings), in_force(Settings{}));
+}
+
+TEST_F(SettingsFile, TheSampleUncommentedIsTheDefault) {
+    std::istringstream sample(sample_file());
+    std::string text;
+    for (std::string line; std::getline(sample, line);)
+        if (line.starts_with("#") && !line.starts_with("# ")) text += line.substr(1) + "\n";
+    Settings settings;
+    load_file(settings, write(text));
+    EXPECT_EQ(in_force(settings), in_force(Settings{}));
+    EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), static_cast<std::ptrdiff_t>(keys().size()));
+}
+
+TEST(Sample, TheShippedFileIsTheTable) {
+    std::ifstream shipped(GROUNDLINE_SOURCE_DIR "/config/groundline.yaml");
+    std::stringstream text;
+    text << shipped.rdbuf();
+    EXPECT_EQ(text.str(), sample_file()) << "write it anew with: groundline config > config/groundline.yaml";
+}
+
+TEST(Mount, HalfAMountIsRefusedAndAWholeOneNarrowsTheGate) {
+    Settings settings;
+    EXPECT_FALSE(terrain_config(settings).mount_known);
+    set_word(settings, "mount.height_m=1");
+    refusal([&] { terrain_config(settings); }, ExitStatus::kConfig);
+    set_word(settings, "mount.pitch_deg=10");
+    const terrain::TerrainConfig config = terrain_config(settings);
+    EXPECT_TRUE(config.mount_known);
+    EXPECT_EQ(config.gate.pitch_min_deg, 2.0);
+    EXPECT_EQ(config.gate.pitch_max_deg, 18.0);
+    EXPECT_EQ(config.gate.height_max_m, 1.3);
+}
+
+TEST(EditDistance, CountsInsertionsDeletionsAndSubstitutions) {
+    EXPECT_EQ(edit_distance("", ""), 0U);
+    EXPECT_EQ(edit_distance("abc", ""), 3U);
+    EXPECT_EQ(edit_distance("kitten", "sitting"), 3U);
+    EXPECT_EQ(edit_distance("normalize", "normalise"), 1U);
+}
+
+}  // namespace
+}  // namespace groundline::settings
