@@ -22,11 +22,6 @@ bool all_finite(const Range& values) {
     return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
 }
 
-bool is_rotation(const Matrix3& m) {
-    return all_finite(m) && distance(m * transposed(m), kIdentity3) <= kRotationTolerance &&
-           determinant(m) > 0.0;
-}
-
 class Check {
   public:
     explicit Check(const StereoCalibration& calibration) : calibration_(calibration) {}
@@ -48,11 +43,11 @@ class Check {
         const double off_u = std::abs(camera.cx - 0.5 * (width - 1));
         const double off_v = std::abs(camera.cy - 0.5 * (height - 1));
         const bool size_unknown = camera.width == 0 && camera.height == 0;
-        if (size_unknown && (off_u > 0.25 * width || off_v > 0.25 * height))
-            refuse(
-                fmt::format("the {} camera's principal point ({:.1f}, {:.1f}) is more than a quarter off the "
-                            "middle of pictures of {} x {}; was it calibrated for another size?",
-                            side, camera.cx, camera.cy, width, height));
+        if (size_unknown && (off_u > 0.25 * width || off_v > 0.25 * width))
+            refuse(fmt::format(
+                "the {} camera's principal point ({:.1f}, {:.1f}) is more than a quarter of "
+                "the width off the middle of pictures of {} x {}; was it calibrated for another size?",
+                side, camera.cx, camera.cy, width, height));
     }
 
     void baseline(double baseline_m) const {
@@ -144,6 +139,11 @@ class Check {
 };
 
 }  // namespace
+
+bool is_rotation(const Matrix3& matrix) {
+    return all_finite(matrix) && distance(matrix * transposed(matrix), kIdentity3) <= kRotationTolerance &&
+           determinant(matrix) > 0.0;
+}
 
 void require_usable(const StereoCalibration& calibration, int width, int height) {
     const Check check(calibration);

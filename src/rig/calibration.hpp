@@ -53,11 +53,14 @@ struct StereoCalibration {
     int disparities_hint = 0;  // Middlebury's ndisp; 0: none
 };
 
+// Orthonormal and right-handed within what files round to (0.002 in each element).
+bool is_rotation(const Matrix3& matrix);
+
 // Throws Refusal(kConfig), naming calibration.source, unless pictures of width x height can be rectified with
 // it: the size agrees (or, where the file gives none, each principal point lies within a quarter of the width
-// and of the height from the middle), everything is finite, focal lengths are positive, rotations are
-// rotations, the cameras look the same way and stand side by side with the right one on the right, 1 mm to
-// 5 m apart, and a given rectification belongs to rotation and translation.
+// from the middle), everything is finite, focal lengths are positive, rotations are rotations, the cameras
+// look the same way and stand side by side with the right one on the right, 1 mm to 5 m apart, and a given
+// rectification belongs to rotation and translation.
 void require_usable(const StereoCalibration& calibration, int width, int height);
 
 }  // namespace groundline::rig
