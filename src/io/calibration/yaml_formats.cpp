@@ -9,6 +9,9 @@
 namespace groundline::io {
 namespace {
 
+using rig::transposed;
+using rig::operator*;
+
 // A rigid motion X -> rotation X + translation.
 struct Motion {
     rig::Matrix3 rotation;
