@@ -13,7 +13,7 @@ namespace groundline::capture {
 
 // Everything io/pair_reader.hpp opens. Throws Refusal(kInput) with the file and what was expected.
 std::unique_ptr<FrameSource> open_files(const std::vector<std::string>& source);
-// The same for a reader that is already open; `name` is what the operator gave.
+// The same for a reader that is already open.
 std::unique_ptr<FrameSource> files_source(std::unique_ptr<io::PairReader> reader);
 
 }  // namespace groundline::capture

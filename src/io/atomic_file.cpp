@@ -1,6 +1,7 @@
 #include "io/atomic_file.hpp"
 
 #include <fcntl.h>
+#include <fmt/core.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -33,8 +34,7 @@ class Descriptor {
 };
 
 [[noreturn]] void fail(const char* what, const std::filesystem::path& path, int error) {
-    throw std::runtime_error(std::string("cannot ") + what + " '" + path.string() +
-                             "': " + std::strerror(error));
+    throw std::runtime_error(fmt::format("cannot {} '{}': {}", what, path.string(), std::strerror(error)));
 }
 
 bool write_all(int descriptor, std::span<const std::uint8_t> bytes) {
@@ -50,7 +50,8 @@ bool write_all(int descriptor, std::span<const std::uint8_t> bytes) {
 }  // namespace
 
 void write_file_whole(const std::filesystem::path& path, std::span<const std::uint8_t> bytes) {
-    const std::filesystem::path temporary = path.parent_path() / ("." + path.filename().string() + ".tmp");
+    const std::string name = path.filename().string();
+    const std::filesystem::path temporary = path.parent_path() / fmt::format(".{}.tmp", name);
     Descriptor file(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
     if (file.get() < 0) fail("write", path, errno);
     if (!write_all(file.get(), bytes) || !file.close() || std::rename(temporary.c_str(), path.c_str()) != 0) {
@@ -68,7 +69,8 @@ void read_file_whole(const std::filesystem::path& path, std::vector<std::uint8_t
     const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
     struct stat status {};
     if (file.get() < 0 || ::fstat(file.get(), &status) != 0) fail("read", path, errno);
-    if (!S_ISREG(status.st_mode)) throw std::runtime_error("cannot read '" + path.string() + "': no file");
+    if (!S_ISREG(status.st_mode))
+        throw std::runtime_error(fmt::format("cannot read '{}': it is no file", path.string()));
     bytes.resize(static_cast<std::size_t>(status.st_size));
     std::size_t filled = 0;
     while (filled < bytes.size()) {

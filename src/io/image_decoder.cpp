@@ -1,5 +1,7 @@
 #include "io/image_decoder.hpp"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <opencv2/core.hpp>
 #include <opencv2/core/utils/logger.hpp>
@@ -21,7 +23,7 @@ void quiet_opencv() {
 }
 
 [[noreturn]] void refuse(const std::filesystem::path& path, const std::string& why) {
-    throw std::runtime_error("cannot read image '" + path.string() + "': " + why);
+    throw std::runtime_error(fmt::format("cannot read the image '{}': {}", path.string(), why));
 }
 
 // One sample as 8 bits.

@@ -1,5 +1,7 @@
 #include "io/image_integrity.hpp"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -117,10 +119,10 @@ bool looks_like_image(Bytes bytes) {
 std::string image_fault(Bytes bytes) {
     if (bytes.empty()) return "the file is empty";
     bool whole = true;
-    std::string name;
+    std::string_view name;
     switch (format_of(bytes)) {
         case Format::kNone:
-            return "it is not " + std::string(kImageFormats);
+            return fmt::format("it is not {}", kImageFormats);
         case Format::kPng:
             whole = png_whole(bytes);
             name = "PNG";
@@ -141,7 +143,7 @@ std::string image_fault(Bytes bytes) {
             break;
     }
     if (whole) return {};
-    return "the " + name + " data end too early (truncated file)";
+    return fmt::format("the {} data end too early (truncated file)", name);
 }
 
 }  // namespace groundline::io

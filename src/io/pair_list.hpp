@@ -36,6 +36,10 @@ PairList list_pairs(const std::filesystem::path& folder);
 // A pair given as two files; the folder is the deepest one that holds both.
 PairList list_two_images(const std::filesystem::path& left, const std::filesystem::path& right);
 
+// Names of the image files of a folder, by extension, in the order of list_pairs; hidden files are none.
+// Throws Refusal(kInput) where the folder cannot be read.
+std::vector<std::filesystem::path> images_in(const std::filesystem::path& folder);
+
 // Two exposures of one trigger differ by less than this; half of what 100 Hz would allow.
 inline constexpr std::int64_t kMaxSkewNs = 5'000'000;
 

@@ -1,5 +1,7 @@
 #include "io/png.hpp"
 
+#include <fmt/core.h>
+
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
@@ -20,9 +22,9 @@ void write_matrix(const std::filesystem::path& path, const cv::Mat& image) {
         encoded.clear();
     }
     if (encoded.empty())
-        throw std::runtime_error("cannot write '" + path.string() + "': the picture (" +
-                                 std::to_string(image.cols) + "x" + std::to_string(image.rows) +
-                                 ") cannot be encoded as PNG");
+        throw std::runtime_error(
+            fmt::format("cannot write '{}': the picture ({}x{}) cannot be encoded as PNG", path.string(),
+                        image.cols, image.rows));
     write_file_whole(path, encoded);
 }
 
@@ -85,8 +87,8 @@ Image16 read_png16(const std::filesystem::path& path) {
     const ImageShape shape = decoder.load(path);
     if (shape.bits != 16 || shape.colour)
         throw std::runtime_error(
-            "cannot read '" + path.string() + "': expected a grey image of 16 bits, found " +
-            (shape.colour ? "colour" : "grey") + " of " + std::to_string(shape.bits) + " bits");
+            fmt::format("cannot read '{}': expected a grey image of 16 bits, found {} of {} bits",
+                        path.string(), shape.colour ? "colour" : "grey", shape.bits));
     Image16 image;
     image.width = shape.width;
     image.height = shape.height;

@@ -1,6 +1,7 @@
 // Images in files: PNG written whole or not at all, and every still format of the sources read into memory.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <vector>
@@ -18,6 +19,7 @@ struct Image8 {
     int channels = 1;
 
     ConstLuma luma() const { return {bytes.data(), width, height, width}; }  // 1 channel only
+    BgrView bgr() { return {bytes.data(), width, height, 3 * static_cast<std::ptrdiff_t>(width)}; }  // 3 only
 };
 
 // A decoded 16-bit image of one channel.
