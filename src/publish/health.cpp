@@ -1,0 +1,100 @@
+#include "publish/health.hpp"
+
+namespace groundline::publish {
+namespace {
+
+constexpr double kNsPerMs = 1e6;
+constexpr std::int64_t kRateWindowNs = 1'000'000'000;
+
+double rate_hz(std::uint64_t before, std::uint64_t after, std::int64_t elapsed_ns) {
+    return static_cast<double>(after - before) * 1e9 / static_cast<double>(elapsed_ns);
+}
+
+// A file's stamps are of another day, and an unknown one may be anything.
+bool is_of_this_clock(StampSource source) {
+    return source != StampSource::kUnknown && source != StampSource::kFile;
+}
+
+}  // namespace
+
+LatencySummary summary_of(const LatencyHistogram& histogram) {
+    if (histogram.count() == 0) return {};
+    return {static_cast<double>(histogram.percentile_ns(0.50)) / kNsPerMs,
+            static_cast<double>(histogram.percentile_ns(0.99)) / kNsPerMs,
+            static_cast<double>(histogram.max_ns()) / kNsPerMs};
+}
+
+HealthTracker::HealthTracker(const Counters* counters, std::int64_t stale_after_ns)
+    : counters_(counters), stale_after_ns_(stale_after_ns) {}
+
+void HealthTracker::note(const FrameResult& result, std::int64_t publish_ns, std::int64_t now_mono_ns) {
+    ++published_;
+    last_mono_ns_ = now_mono_ns;
+    last_.exposure_mono_ns = result.stamp.exposure_mono_ns;
+    last_.stamp_source = result.stamp.source;
+    last_.sequence = result.stamp.sequence;
+    last_.verdict = result.verdict;
+    last_.reasons = result.reasons;
+    last_.pair_skew_ms = static_cast<double>(result.stamp.skew_ns) / kNsPerMs;
+    last_.brightness_gain = result.evidence.photometric.gain;
+    last_.brightness_offset = result.evidence.photometric.offset;
+    for (std::size_t stage = 0; stage < stages_.size(); ++stage)
+        if (result.times_ns[stage] > 0) stages_[stage].add(result.times_ns[stage]);
+    stages_[static_cast<std::size_t>(Stage::kPublish)].add(publish_ns);
+    if (is_of_this_clock(result.stamp.source))
+        exposure_to_publish_.add(now_mono_ns - result.stamp.exposure_mono_ns);
+}
+
+bool HealthTracker::silent(std::int64_t now_mono_ns) const {
+    return published_ == 0 || now_mono_ns - last_mono_ns_ > stale_after_ns_;
+}
+
+HealthTracker::Totals HealthTracker::totals(std::int64_t now_mono_ns) const {
+    Totals now{now_mono_ns, 0, 0, published_};
+    if (counters_ != nullptr) {
+        now.read = counters_->get(Count::kFramesRead);
+        now.processed = counters_->get(Count::kFramesProcessed);
+    }
+    return now;
+}
+
+void HealthTracker::update_rates(std::int64_t now_mono_ns) {
+    const Totals now = totals(now_mono_ns);
+    const std::int64_t elapsed_ns = now_mono_ns - window_.mono_ns;
+    if (window_open_ && elapsed_ns < kRateWindowNs) return;
+    if (window_open_) {
+        last_.publish_rate_hz = rate_hz(window_.published, now.published, elapsed_ns);
+        if (counters_ != nullptr) {
+            last_.source_rate_hz = rate_hz(window_.read, now.read, elapsed_ns);
+            last_.process_rate_hz = rate_hz(window_.processed, now.processed, elapsed_ns);
+        }
+    }
+    window_ = now;
+    window_open_ = true;
+}
+
+HealthReport HealthTracker::report(std::int64_t now_utime_us, std::int64_t now_mono_ns) {
+    update_rates(now_mono_ns);
+    HealthReport report = last_;
+    report.utime_us = now_utime_us;
+    const bool no_pairs = silent(now_mono_ns);
+    report.state = stopping_         ? LifeState::kStopping
+                   : published_ == 0 ? LifeState::kStarting
+                   : no_pairs        ? LifeState::kStalled
+                                     : LifeState::kRunning;
+    if (published_ > 0) report.result_age_s = static_cast<double>(now_mono_ns - last_mono_ns_) / 1e9;
+    if (no_pairs) {
+        report.verdict = Verdict::kBlind;
+        report.reasons = Reasons();
+        report.reasons.add(Reason::kNoFrames);
+    }
+    for (std::size_t stage = 0; stage < stages_.size(); ++stage)
+        report.stages[stage] = summary_of(stages_[stage]);
+    report.exposure_to_publish = summary_of(exposure_to_publish_);
+    if (counters_ != nullptr)
+        for (std::size_t which = 0; which < report.counts.size(); ++which)
+            report.counts[which] = static_cast<std::int64_t>(counters_->get(static_cast<Count>(which)));
+    return report;
+}
+
+}  // namespace groundline::publish
