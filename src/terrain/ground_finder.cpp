@@ -1,1 +1,408 @@
 #include "terrain/ground_finder.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "core/deterministic_math.hpp"
+#include "core/error.hpp"
+#include "terrain/v_disparity.hpp"
+
+namespace groundline::terrain {
+namespace {
+
+constexpr int kUnitsPerPixel = 16;
+constexpr double kRollStepDeg = 4.0;  // half of it blurs a row by 3 px at the edge of a VGA picture
+constexpr double kNearPx = 1.0;
+constexpr double kInlierPx = 1.5;
+constexpr double kResidualPx = 3.0;
+constexpr int kTallyStep = 2;  // columns; every row is tallied, for its support
+// Without calibration: focal length over width and baseline over height of real rigs.
+constexpr double kFocalMin = 0.5, kFocalMax = 1.5;
+constexpr double kSlopeMin = 0.015, kSlopeMax = 1.0;
+
+// The reach of a test of `tolerance_px` where the ground has `ground_px`, as in the plane fit.
+double reach_of(double tolerance_px, double ground_px) {
+    return std::min(tolerance_px, 0.5 + 0.25 * ground_px);
+}
+
+}  // namespace
+
+GroundFinder::GroundFinder(const TerrainConfig& config, const RectifiedRig& rig, int min_disparity,
+                           int disparities, Arena& arena)
+    : config_(config), rig_(rig), disparities_(disparities) {
+    if (rig.width < 32 || rig.height < 32)
+        throw Refusal(ExitStatus::kConfig, "pictures of " + std::to_string(rig.width) + " x " +
+                                               std::to_string(rig.height) +
+                                               " px are too small to find ground in; 32 x 32 is the least");
+    if (disparities < 2)
+        throw Refusal(ExitStatus::kConfig, "a search range of " + std::to_string(disparities) +
+                                               " disparities shows no ground; 2 is the least");
+    const Gate& gate = config.gate;
+    if (!(gate.height_min_m > 0.0) || !(gate.height_min_m < gate.height_max_m) ||
+        !(gate.pitch_min_deg < gate.pitch_max_deg) || !(gate.roll_max_deg > 0.0) ||
+        !(gate.pitch_min_deg > -80.0) || !(gate.pitch_max_deg < 80.0) || !(gate.roll_max_deg < 45.0))
+        throw Refusal(ExitStatus::kConfig,
+                      "the gate for the ground's pose is empty or beyond 80 deg of pitch or 45 deg of roll; "
+                      "check the mount's height, pitch and roll");
+    offset_px_ = rig.calibrated ? rig.offset_px() : 0.0;
+    centre_u_ = rig.calibrated ? rig.cx_px : 0.5 * rig.width;
+    centre_v_ = rig.calibrated ? rig.cy_px : 0.5 * rig.height;
+
+    column_step_ = std::max(1, (rig.width + 160) / 320);
+    row_step_ = 2 * std::max(1, (rig.height + 240) / 480);
+    const double steepest =
+        det::tan(det::radians(std::fabs(gate.roll_deg) + gate.roll_max_deg)) * 0.5 * rig.width;
+    pad_rows_ = static_cast<int>(steepest / row_step_) + 2;
+    const int rows = (rig.height + row_step_ - 1) / row_step_ + 2 * pad_rows_;
+    const int bins = disparities * 4 + 1;
+    for (std::size_t i = 0; i < kMaxRolls; ++i) {
+        hough_[i].take(arena);
+        sheared_[i] = {arena.image<std::uint16_t>(bins, rows), -1.0 * pad_rows_ * row_step_, 1.0 * row_step_,
+                       min_disparity - offset_px_, 4.0};
+        shifts_[i] = arena.take<std::int32_t>(static_cast<std::size_t>(rig.width));
+    }
+    line_gate_.slope_min = arena.take<double>(Hough::kMaxHorizons);
+    line_gate_.slope_max = arena.take<double>(Hough::kMaxHorizons);
+    plane_fit_.take(arena, rig.width, rig.height);
+    tally_ = arena.take<RowTally>(static_cast<std::size_t>(rig.height));
+    supported_rows_ = arena.take<std::uint8_t>(static_cast<std::size_t>(rig.height));
+    column_mass_ = arena.take<std::uint32_t>(static_cast<std::size_t>(bins));
+}
+
+Gate GroundFinder::gate_for(const GroundPose* prior) const {
+    Gate gate = config_.gate;
+    if (prior == nullptr || !rig_.calibrated) return gate;
+    const double pitch_deg = det::degrees(prior->pitch_rad);
+    gate.pitch_min_deg = std::max(gate.pitch_min_deg, pitch_deg - 8.0);
+    gate.pitch_max_deg = std::min(gate.pitch_max_deg, pitch_deg + 8.0);
+    gate.height_min_m = std::max(gate.height_min_m, 0.7 * prior->height_m);
+    gate.height_max_m = std::min(gate.height_max_m, 1.3 * prior->height_m);
+    const bool empty = !(gate.pitch_min_deg < gate.pitch_max_deg) || !(gate.height_min_m < gate.height_max_m);
+    return empty ? config_.gate : gate;
+}
+
+void GroundFinder::set_line_gate(const Gate& gate) {
+    const double bottom = rig_.height - 1.0;
+    const double tan_steep = det::tan(det::radians(gate.pitch_max_deg));
+    const double tan_flat = det::tan(det::radians(gate.pitch_min_deg));
+    double highest = 0.0;
+    double lowest = 0.0;
+    if (rig_.calibrated) {
+        highest = centre_v_ - rig_.focal_px * tan_steep;
+        lowest = centre_v_ - rig_.focal_px * tan_flat;
+    } else {
+        const double longest = kFocalMax * rig_.width;
+        const double shortest = kFocalMin * rig_.width;
+        highest = centre_v_ - tan_steep * (tan_steep > 0.0 ? longest : shortest);
+        lowest = centre_v_ - tan_flat * (tan_flat > 0.0 ? shortest : longest);
+    }
+    // A ground seen on less than a sixteenth of the rows is none.
+    lowest = std::min(lowest, bottom - rig_.height / 16.0);
+    highest = std::min(highest, lowest - 2.0);
+    LineGate& lines = line_gate_;
+    lines.bottom_row = bottom;
+    lines.horizon_first = highest;
+    lines.horizon_step = std::max(2.0, (lowest - highest) / (Hough::kMaxHorizons - 1));
+    lines.count =
+        std::min(Hough::kMaxHorizons, static_cast<int>((lowest - highest) / lines.horizon_step) + 1);
+    for (int j = 0; j < lines.count; ++j) {
+        const auto at = static_cast<std::size_t>(j);
+        if (!rig_.calibrated) {
+            lines.slope_min[at] = kSlopeMin;
+            lines.slope_max[at] = kSlopeMax;
+            continue;
+        }
+        // slope = b cos(pitch) / h for the pitch of this horizon
+        const double tangent = (centre_v_ - (highest + j * lines.horizon_step)) / rig_.focal_px;
+        const double scale = rig_.baseline_m / std::sqrt(1.0 + tangent * tangent);
+        lines.slope_min[at] = scale / gate.height_max_m;
+        lines.slope_max[at] = scale / gate.height_min_m;
+    }
+}
+
+void GroundFinder::shear(ConstDisparityMap map, double tan_roll, RowHistogram& histogram,
+                         std::span<std::int32_t> shifts) const {
+    const int bins = histogram.cells.width;
+    const int last_row = histogram.cells.height - 1;
+    const int first_q4 =
+        static_cast<int>(std::floor((histogram.first_px + offset_px_) * kDisparityOne + 0.5));
+    for (int i = 0; i <= last_row; ++i)
+        std::fill_n(histogram.cells.row(i), bins, std::uint16_t{0});
+    for (int u = 0; u < map.width(); ++u)
+        shifts[static_cast<std::size_t>(u)] =
+            pad_rows_ + static_cast<int>(std::floor((u - centre_u_) * tan_roll / row_step_ + 0.5));
+    for (int v = 0; v < map.height(); v += row_step_) {
+        const std::int16_t* disparity = map.disparity_q4.row(v);
+        const Invalid* invalid = map.invalid.row(v);
+        const int row = v / row_step_;
+        for (int u = 0; u < map.width(); u += column_step_) {
+            if (invalid[u] != Invalid::kNone) continue;
+            const int above = disparity[u] - first_q4;
+            const int bin = above >> 2;
+            if (above < 0 || bin + 1 >= bins) continue;
+            const int target = std::clamp(row + shifts[static_cast<std::size_t>(u)], 0, last_row);
+            std::uint16_t* cells = histogram.cells.row(target) + bin;
+            const int upper = (above & 3) * (kUnitsPerPixel / 4);
+            cells[0] = static_cast<std::uint16_t>(cells[0] + kUnitsPerPixel - upper);
+            cells[1] = static_cast<std::uint16_t>(cells[1] + upper);
+        }
+    }
+}
+
+bool GroundFinder::fit(ConstDisparityMap map, const Gate& gate, Parallel& parallel, PlaneFitResult& best,
+                       double& second_ratio) {
+    // Roll hypotheses: a v-disparity line is sharp only when the rows are level with the ground.
+    int either_side = 0;
+    if (config_.line == LineMode::kVotes)
+        either_side = std::min(kMaxRolls / 2, static_cast<int>(std::ceil(gate.roll_max_deg / kRollStepDeg)));
+    const int rolls = 2 * either_side + 1;
+    constexpr int kPeaks = HoughResult::kPeaks;
+    constexpr std::size_t kStarts = static_cast<std::size_t>(kMaxRolls) * kPeaks;
+    std::array<double, kMaxRolls> tangent{};
+    std::array<HoughResult, kMaxRolls> found{};
+    for (int i = 0; i < rolls; ++i) {
+        const double away = either_side == 0 ? 0.0 : (i - either_side) * gate.roll_max_deg / either_side;
+        tangent[static_cast<std::size_t>(i)] = det::tan(det::radians(gate.roll_deg + away));
+    }
+    const int cap = std::max(4, map.width() / column_step_ / 16) * kUnitsPerPixel;
+    const double bottom_max_px = 2.0 * (disparities_ + 1);
+    parallel.for_each(rolls, [&](int index, int) {
+        const auto i = static_cast<std::size_t>(index);
+        shear(map, tangent[i], sheared_[i], shifts_[i]);
+        found[i] = hough_[i].find(sheared_[i], line_gate_, bottom_max_px, cap, config_.line);
+    });
+
+    // Each roll's peaks, brought to the plane next to them; votes tell a good roll poorly (a blurred line
+    // still fills its rows), the weight of the pixels on the plane tells it well.
+    plane_fit_.sample(map, offset_px_);
+    std::array<PlaneFitResult, kStarts> planes{};
+    parallel.for_each(rolls * kPeaks, [&](int index, int) {
+        const auto i = static_cast<std::size_t>(index / kPeaks);
+        const auto peak = static_cast<std::size_t>(index % kPeaks);
+        if (!found[i].found || found[i].votes[peak] <= 0.0) return;
+        const Line line = refine_line(sheared_[i], found[i].lines[peak], cap);
+        DisparityPlane start;
+        start.du = line.slope * tangent[i];
+        start.dv = line.slope;
+        start.d0 = -line.slope * (centre_u_ * tangent[i] + line.horizon_row) + offset_px_;
+        planes[static_cast<std::size_t>(index)] = plane_fit_.converge(start);
+    });
+    const PlaneFitResult* strongest = nullptr;
+    bool strongest_inside = false;
+    for (const PlaneFitResult& plane : planes) {
+        if (!plane.found) continue;
+        const bool plane_inside = inside(plane.plane, gate);
+        if (strongest == nullptr || (plane_inside && !strongest_inside) ||
+            (plane_inside == strongest_inside && plane.weight > strongest->weight)) {
+            strongest = &plane;
+            strongest_inside = plane_inside;
+        }
+    }
+    if (strongest == nullptr) return false;
+    second_ratio = 0.0;
+    for (const PlaneFitResult& plane : planes)
+        if (plane.found && inside(plane.plane, gate) && !nearly_same(plane.plane, strongest->plane))
+            second_ratio = std::max(second_ratio, plane.weight / strongest->weight);
+    best = plane_fit_.fit(map, strongest->plane, parallel);
+    return best.found;
+}
+
+// Two planes are the same ground seen twice when they differ little over the lower part of the picture.
+bool GroundFinder::nearly_same(const DisparityPlane& a, const DisparityPlane& b) const {
+    for (const double row : {0.75 * rig_.height, rig_.height - 1.0}) {
+        for (const double column : {0.25 * rig_.width, 0.75 * rig_.width}) {
+            const double there = a.at(column, row);
+            if (std::fabs(there - b.at(column, row)) > std::max(3.0, 0.15 * (there - offset_px_)))
+                return false;
+        }
+    }
+    return true;
+}
+
+void GroundFinder::tally(ConstDisparityMap map, const DisparityPlane& plane, Parallel& parallel) {
+    constexpr int kRowsPerTask = 16;
+    const int tasks = (map.height() + kRowsPerTask - 1) / kRowsPerTask;
+    parallel.for_each(tasks, [&](int task, int) {
+        for (int v = task * kRowsPerTask; v < std::min(map.height(), (task + 1) * kRowsPerTask); ++v) {
+            const std::int16_t* disparity = map.disparity_q4.row(v);
+            const Invalid* invalid = map.invalid.row(v);
+            const double at_row = plane.dv * v + plane.d0;
+            RowTally row;
+            for (int u = 0; u < map.width(); u += kTallyStep) {
+                const bool valid = invalid[u] == Invalid::kNone;
+                row.blocked += valid ? 0 : 1;
+                const double expected = plane.du * u + at_row;
+                if (expected - offset_px_ < 1.0) continue;
+                ++row.below;
+                if (!valid) continue;
+                ++row.valid;
+                const double residual = disparity[u] * (1.0 / kDisparityOne) - expected;
+                const double size = std::fabs(residual);
+                const double most = reach_of(kResidualPx, expected - offset_px_);
+                if (size >= most) continue;
+                row.near += size <= kNearPx ? 1 : 0;
+                if (size <= kInlierPx) {
+                    ++row.inliers;
+                    row.square += residual * residual;
+                }
+                const double t = residual / most;
+                const double weight = (1.0 - t * t) * (1.0 - t * t);
+                row.weight += weight;
+                row.residual += weight * residual;
+            }
+            tally_[static_cast<std::size_t>(v)] = row;
+        }
+    });
+}
+
+double GroundFinder::chance(double reach_px) const {
+    return std::min(1.0, 2.0 * reach_px / disparities_);
+}
+
+// Marks the rows this frame's own pixels support and returns the length of their longest run.
+int GroundFinder::support_rows(const DisparityPlane& plane) {
+    const int height = static_cast<int>(tally_.size());
+    const double share = std::max(0.1, std::min(0.5, 3.0 * chance(kNearPx)));
+    const int least = std::max(3, rig_.width / 320);
+    const int gap = std::max(2, height / 40);
+    const double last_px = sheared_[0].px_of(sheared_[0].cells.width - 1) + offset_px_;
+    int longest = 0;
+    int run_start = -1;
+    int last_supported = -1;
+    for (int v = height - 1; v >= 0; --v) {
+        const RowTally& row = tally_[static_cast<std::size_t>(v)];
+        const bool possible = plane.at(centre_u_, v) <= last_px + 1.0;
+        const bool supported = possible && row.near >= least && row.near >= share * row.valid;
+        supported_rows_[static_cast<std::size_t>(v)] = supported ? 1 : 0;
+        if (!supported) continue;
+        if (run_start < 0 || last_supported - v > gap + 1) {
+            run_start = v;
+        } else {
+            for (int between = v + 1; between < last_supported; ++between)
+                supported_rows_[static_cast<std::size_t>(between)] = 1;
+        }
+        last_supported = v;
+        longest = std::max(longest, run_start - v + 1);
+    }
+    return longest;
+}
+
+bool GroundFinder::inside(const DisparityPlane& plane, const Gate& gate) const {
+    if (!(plane.dv > 0.0)) return false;
+    const double tangent = plane.du / plane.dv;
+    const double roll_deg = det::degrees(det::atan(tangent));
+    if (std::fabs(roll_deg - gate.roll_deg) > gate.roll_max_deg) return false;
+    if (!rig_.calibrated) {
+        const double horizon = -(plane.du * centre_u_ + plane.d0) / plane.dv;
+        const double last = line_gate_.horizon_first + (line_gate_.count - 1) * line_gate_.horizon_step;
+        return plane.dv >= kSlopeMin && plane.dv <= kSlopeMax && horizon >= line_gate_.horizon_first &&
+               horizon <= last + line_gate_.horizon_step;
+    }
+    const GroundPose pose = pose_of(plane, rig_);
+    const double pitch_deg = det::degrees(pose.pitch_rad);
+    return pitch_deg >= gate.pitch_min_deg && pitch_deg <= gate.pitch_max_deg &&
+           pose.height_m >= gate.height_min_m && pose.height_m <= gate.height_max_m;
+}
+
+// Whether a plane is nearer to upright than to level: its normal points less than half downward.
+bool GroundFinder::leans(const DisparityPlane& plane) const {
+    const double focal = rig_.calibrated ? rig_.focal_px : static_cast<double>(rig_.width);
+    const double along = (plane.at(centre_u_, centre_v_) - offset_px_) / focal;
+    const double square = plane.du * plane.du + plane.dv * plane.dv + along * along;
+    return !(plane.dv > 0.0) || plane.dv * plane.dv < 0.25 * square;
+}
+
+// The largest mass, in pixels, that any 2 px of disparity hold in the rows from first_row down: what is
+// upright and faces the camera has one disparity in all its rows.
+double GroundFinder::upright_mass(const VDisparity& v_disparity, int first_row) {
+    const int bins = v_disparity.histogram.width;
+    std::fill(column_mass_.begin(), column_mass_.end(), 0U);
+    for (int v = std::max(0, first_row); v < v_disparity.histogram.height; ++v) {
+        const std::uint16_t* cells = v_disparity.histogram.row(v);
+        for (int k = 0; k < bins; ++k)
+            column_mass_[static_cast<std::size_t>(k)] += cells[k];
+    }
+    const int window = 2 * v_disparity.bins_per_px + 1;
+    std::uint64_t mass = 0;
+    std::uint64_t most = 0;
+    for (int k = 0; k < bins; ++k) {
+        mass += column_mass_[static_cast<std::size_t>(k)];
+        if (k >= window) mass -= column_mass_[static_cast<std::size_t>(k - window)];
+        most = std::max(most, mass);
+    }
+    return static_cast<double>(most) / kUnitsPerPixel;
+}
+
+void GroundFinder::find(ConstDisparityMap map, VDisparity& v_disparity, Parallel& parallel,
+                        const GroundPose* prior, GroundEvidence& evidence, Ground& ground) {
+    evidence = {};
+    ground = {};
+    build_v_disparity(map, v_disparity, parallel);
+    const Gate gate = gate_for(prior);
+    set_line_gate(gate);
+
+    PlaneFitResult fitted;
+    double second_ratio = 0.0;
+    const bool has_plane = fit(map, gate, parallel, fitted, second_ratio);
+    // Without a plane the tallies are of the lower half: a plane that is 1 px there and below.
+    DisparityPlane plane = fitted.plane;
+    if (!has_plane) plane = {0.0, 1.0, 1.0 + offset_px_ - 0.5 * rig_.height};
+    tally(map, plane, parallel);
+
+    const int height = map.height();
+    const int lower_third = height - height / 3;
+    double below = 0, valid = 0, inliers = 0, blocked = 0, square = 0;
+    double row_residuals = 0.0;
+    int rows_with_residual = 0;
+    int rows_below = 0;
+    int first_below = height;
+    for (int v = 0; v < height; ++v) {
+        const RowTally& row = tally_[static_cast<std::size_t>(v)];
+        below += row.below;
+        valid += row.valid;
+        inliers += row.inliers;
+        if (v >= lower_third) blocked += row.blocked;
+        square += row.square;
+        if (row.weight >= std::max(3, rig_.width / 320)) {
+            row_residuals += std::fabs(row.residual / row.weight);
+            ++rows_with_residual;
+        }
+        if (2 * kTallyStep * row.below >= map.width()) {
+            ++rows_below;
+            first_below = std::min(first_below, v);
+        }
+    }
+    evidence.density = below > 0 ? valid / below : 0.0;
+    evidence.blocked_share = blocked * kTallyStep / (1.0 * map.width() * (height - lower_third));
+    const double upright = upright_mass(v_disparity, first_below);
+    if (!has_plane) {
+        std::fill(supported_rows_.begin(), supported_rows_.end(), std::uint8_t{0});
+        evidence.wall = valid > 0 && upright > 0.5 * kTallyStep * valid;
+        return;
+    }
+    evidence.inlier_share = valid > 0 ? inliers / valid : 0.0;
+    evidence.line_run_share =
+        rows_below > 0 ? std::min(1.0, static_cast<double>(support_rows(plane)) / rows_below) : 0.0;
+    evidence.second_peak_ratio = second_ratio;
+    evidence.residual_rms_px = inliers > 0 ? std::sqrt(square / inliers) : 0.0;
+    evidence.row_residual_px = rows_with_residual > 0 ? row_residuals / rows_with_residual : 0.0;
+    evidence.inside_gate = inside(plane, gate);
+    evidence.wall = leans(plane) || upright > kTallyStep * inliers;
+    // Twice what pixels spread evenly over the search range would put on any plane.
+    const double least_share = std::max(0.1, std::min(0.5, 2.0 * chance(kInlierPx)));
+    evidence.line_found = evidence.inlier_share >= least_share && evidence.line_run_share >= 0.1;
+    ground.found = evidence.line_found && evidence.inside_gate && !evidence.wall;
+    if (!ground.found) {
+        std::fill(supported_rows_.begin(), supported_rows_.end(), std::uint8_t{0});
+        return;
+    }
+    ground.plane = plane;
+    ground.covariance = fitted.covariance;
+    ground.metric = rig_.calibrated;
+    if (!rig_.calibrated) return;
+    ground.pose = pose_of(plane, rig_);
+    ground.sigma = pose_sigma(plane, fitted.covariance, rig_);
+}
+
+}  // namespace groundline::terrain

@@ -1,6 +1,7 @@
 // From disparities to the ground: v-disparity, Hough line, robust line, robust plane with roll.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 
@@ -39,33 +40,49 @@ class GroundFinder {
     std::span<const std::uint8_t> supported_rows() const { return supported_rows_; }
 
   private:
-    struct RowTally;
-    struct Start;
+    struct RowTally {
+        std::int32_t below = 0;    // sampled pixels below the horizon
+        std::int32_t valid = 0;    // of these, with a disparity
+        std::int32_t near = 0;     // of these, within 1 px of the ground
+        std::int32_t inliers = 0;  // within 1.5 px
+        std::int32_t blocked = 0;  // invalid pixels of the whole row
+        double square = 0.0;       // of the inliers' residuals
+        double weight = 0.0;       // Tukey weights at 3 px
+        double residual = 0.0;     // weighted sum
+    };
+    static constexpr int kMaxRolls = 7;
 
     Gate gate_for(const GroundPose* prior) const;
     void set_line_gate(const Gate& gate);
-    bool find_line(ConstDisparityMap map, const VDisparity& v_disparity, const Gate& gate, Parallel& parallel,
-                   Start& start);
-    void shear(ConstDisparityMap map, double tan_roll, RowHistogram& histogram);
+    void shear(ConstDisparityMap map, double tan_roll, RowHistogram& histogram,
+               std::span<std::int32_t> shifts) const;
+    bool fit(ConstDisparityMap map, const Gate& gate, Parallel& parallel, PlaneFitResult& best,
+             double& second_ratio);
     void tally(ConstDisparityMap map, const DisparityPlane& plane, Parallel& parallel);
+    int support_rows(const DisparityPlane& plane);
     bool inside(const DisparityPlane& plane, const Gate& gate) const;
-    bool upright(const VDisparity& v_disparity, const DisparityPlane* plane) const;
-    void weigh(ConstDisparityMap map, const DisparityPlane* plane, GroundEvidence& evidence);
-
-    static constexpr int kMaxRolls = 7;
+    bool nearly_same(const DisparityPlane& a, const DisparityPlane& b) const;
+    bool leans(const DisparityPlane& plane) const;
+    double upright_mass(const VDisparity& v_disparity, int first_row);
+    double chance(double reach_px) const;
 
     TerrainConfig config_;
     RectifiedRig rig_;
-    int min_disparity_;
     int disparities_;
     double offset_px_;  // measured minus true disparity
-    double centre_u_;
+    double centre_u_;   // where a line's horizon row is meant
+    double centre_v_;
+    int column_step_ = 1;  // sampling of the sheared histograms
+    int row_step_ = 2;
+    int pad_rows_ = 0;  // histogram rows above and below the picture that a roll shears into
     LineGate line_gate_;
     std::array<Hough, kMaxRolls> hough_;
     std::array<RowHistogram, kMaxRolls> sheared_;
+    std::array<std::span<std::int32_t>, kMaxRolls> shifts_;
     PlaneFit plane_fit_;
     std::span<RowTally> tally_;
     std::span<std::uint8_t> supported_rows_;
+    std::span<std::uint32_t> column_mass_;
 };
 
 }  // namespace groundline::terrain

@@ -1,1 +1,277 @@
 #include "terrain/hough.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <limits>
+
+namespace groundline::terrain {
+namespace {
+
+constexpr int kUnitsPerPixel = 16;
+constexpr double kLeastRowsBelow = 6.0;  // nearer to the horizon a cell's half bin swings the line by 10 %
+constexpr int kCandidates = 32;          // peaks the longest segment is sought among
+
+// Two lines are the same ground seen twice when they differ by little both at the bottom and half-way to the
+// horizon: a peak's own slopes in the accumulator must not count as a rival.
+bool nearly_same(const Line& a, const Line& b, double bottom_row) {
+    const double middle_row = 0.5 * (bottom_row + a.horizon_row);
+    for (const double row : {bottom_row, middle_row}) {
+        const double reference = a.at(row);
+        const double difference = std::fabs(reference - b.at(row));
+        if (difference > std::max(3.0, 0.2 * reference)) return false;
+    }
+    return true;
+}
+
+// Mass within `reach_px` of the line in one row.
+int mass_near(const RowHistogram& histogram, const std::uint16_t* cells, double d_px, double reach_px) {
+    const double centre = (d_px - histogram.first_px) * histogram.bins_per_px;
+    const double reach = reach_px * histogram.bins_per_px;
+    const int bins = histogram.cells.width;
+    if (!(centre + reach >= 0.0) || centre - reach >= bins) return 0;
+    const int first = std::max(0, static_cast<int>(std::ceil(centre - reach)));
+    const int last = std::min(bins - 1, static_cast<int>(std::floor(centre + reach)));
+    int mass = 0;
+    for (int k = first; k <= last; ++k)
+        mass += cells[k];
+    return mass;
+}
+
+}  // namespace
+
+void Hough::take(Arena& arena) {
+    votes_ = arena.take<std::uint32_t>(static_cast<std::size_t>(kMaxHorizons) * kMaxBottoms);
+    smoothed_ = arena.take<std::uint32_t>(votes_.size());
+    inverse_ = arena.take<double>(static_cast<std::size_t>(kMaxHorizons));
+}
+
+Line Hough::line_of(const LineGate& gate, int horizon, int bottom) const {
+    const double row = gate.horizon_first + horizon * gate.horizon_step;
+    return {row, bottom * bottom_step_ / (gate.bottom_row - row)};
+}
+
+void Hough::vote(const RowHistogram& histogram, const LineGate& gate, int cap) {
+    const int bins = histogram.cells.width;
+    // Lines need at least one true pixel of disparity: farther is beyond any use and full of mismatches.
+    const int first_bin =
+        std::max(1, static_cast<int>(std::ceil((1.0 - histogram.first_px) * histogram.bins_per_px)));
+    const int least = 4 * kUnitsPerPixel;
+    for (int i = 0; i < histogram.cells.height; ++i) {
+        const std::uint16_t* cells = histogram.cells.row(i);
+        const double row = histogram.row_of(i);
+        struct Peak {
+            int mass;
+            int bin;
+        };
+        std::array<Peak, kPeaksPerRow> peaks{};
+        int count = 0;
+        int before = 0;
+        int mass = first_bin + 1 < bins ? cells[first_bin - 1] + cells[first_bin] + cells[first_bin + 1] : 0;
+        for (int k = first_bin; k + 1 < bins; ++k) {
+            const int after = k + 2 < bins ? cells[k] + cells[k + 1] + cells[k + 2] : 0;
+            if (mass >= least && mass > before && mass >= after) {
+                int at = count < kPeaksPerRow ? count++ : kPeaksPerRow - 1;
+                if (at == kPeaksPerRow - 1 && peaks[static_cast<std::size_t>(at)].mass >= mass) at = -1;
+                if (at >= 0) {
+                    for (; at > 0 && peaks[static_cast<std::size_t>(at - 1)].mass < mass; --at)
+                        peaks[static_cast<std::size_t>(at)] = peaks[static_cast<std::size_t>(at - 1)];
+                    peaks[static_cast<std::size_t>(at)] = {mass, k};
+                }
+            }
+            before = mass;
+            mass = after;
+        }
+        // Horizons high enough above this row; the nearest to the row come last.
+        int last =
+            static_cast<int>(std::floor((row - kLeastRowsBelow - gate.horizon_first) / gate.horizon_step));
+        if (row - kLeastRowsBelow < gate.horizon_first) continue;
+        last = std::min(last, gate.count - 1);
+        for (int j = 0; j <= last; ++j)
+            inverse_[static_cast<std::size_t>(j)] =
+                1.0 / (row - (gate.horizon_first + j * gate.horizon_step));
+        for (int p = 0; p < count; ++p) {
+            const Peak& peak = peaks[static_cast<std::size_t>(p)];
+            const double d_px = histogram.px_of(peak.bin);
+            const auto weight = static_cast<std::uint32_t>(std::min(peak.mass, cap));
+            for (int j = last; j >= 0; --j) {
+                const auto at = static_cast<std::size_t>(j);
+                const double slope = d_px * inverse_[at];
+                if (slope > gate.slope_max[at]) continue;
+                if (slope < gate.slope_min[at]) continue;
+                const double horizon = gate.horizon_first + j * gate.horizon_step;
+                const double bottom = slope * (gate.bottom_row - horizon) / bottom_step_ + 0.5;
+                if (bottom >= bottoms_) continue;
+                votes_[at * kMaxBottoms + static_cast<std::size_t>(bottom)] += weight;
+            }
+        }
+    }
+}
+
+void Hough::smooth(int horizons) {
+    const auto width = static_cast<std::size_t>(bottoms_);
+    for (int j = 0; j < horizons; ++j) {
+        const std::uint32_t* here = &votes_[static_cast<std::size_t>(j) * kMaxBottoms];
+        const std::uint32_t* above = j > 0 ? here - kMaxBottoms : nullptr;
+        const std::uint32_t* below = j + 1 < horizons ? here + kMaxBottoms : nullptr;
+        std::uint32_t* out = &smoothed_[static_cast<std::size_t>(j) * kMaxBottoms];
+        std::uint32_t left = 0;
+        const auto column = [&](std::size_t k) {
+            return here[k] + (above != nullptr ? above[k] : 0U) + (below != nullptr ? below[k] : 0U);
+        };
+        std::uint32_t middle = column(0);
+        for (std::size_t k = 0; k < width; ++k) {
+            const std::uint32_t right = k + 1 < width ? column(k + 1) : 0U;
+            out[k] = left + middle + right;
+            left = middle;
+            middle = right;
+        }
+    }
+}
+
+HoughResult Hough::find(const RowHistogram& histogram, const LineGate& gate, double bottom_max_px, int cap,
+                        LineMode mode) {
+    assert(gate.count <= kMaxHorizons);
+    HoughResult result;
+    bottom_step_ = std::max(0.5, bottom_max_px / (kMaxBottoms - 1));
+    bottoms_ = std::min(kMaxBottoms, static_cast<int>(bottom_max_px / bottom_step_) + 1);
+    for (int j = 0; j < gate.count; ++j)
+        std::fill_n(&votes_[static_cast<std::size_t>(j) * kMaxBottoms], bottoms_, 0U);
+    vote(histogram, gate, cap);
+    smooth(gate.count);
+
+    const auto votes_at = [&](int j, int k) {
+        return smoothed_[static_cast<std::size_t>(j) * kMaxBottoms + static_cast<std::size_t>(k)];
+    };
+    Cell best;
+    for (int j = 0; j < gate.count; ++j)
+        for (int k = 1; k < bottoms_; ++k)
+            if (votes_at(j, k) > best.votes) best = {j, k, votes_at(j, k)};
+    if (best.votes == 0) return result;
+
+    if (mode == LineMode::kLongest) {
+        std::array<Cell, kCandidates> candidates{};
+        int count = 0;
+        for (int j = 0; j < gate.count; ++j) {
+            for (int k = 1; k < bottoms_; ++k) {
+                const std::uint32_t votes = votes_at(j, k);
+                if (votes * 4ULL < best.votes) continue;
+                bool peak = true;
+                for (int dj = -1; dj <= 1 && peak; ++dj)
+                    for (int dk = -1; dk <= 1 && peak; ++dk) {
+                        if (j + dj < 0 || j + dj >= gate.count || k + dk >= bottoms_) continue;
+                        const std::uint32_t other = votes_at(j + dj, k + dk);
+                        const bool earlier = dj < 0 || (dj == 0 && dk < 0);
+                        peak = earlier ? other < votes : other <= votes;
+                    }
+                if (!peak) continue;
+                int at = count < kCandidates ? count++ : kCandidates - 1;
+                if (at == kCandidates - 1 && candidates[static_cast<std::size_t>(at)].votes >= votes)
+                    continue;
+                for (; at > 0 && candidates[static_cast<std::size_t>(at - 1)].votes < votes; --at)
+                    candidates[static_cast<std::size_t>(at)] = candidates[static_cast<std::size_t>(at - 1)];
+                candidates[static_cast<std::size_t>(at)] = {j, k, votes};
+            }
+        }
+        const double gap_rows = (gate.bottom_row + 1.0) / 40.0;
+        double longest = -1.0;
+        for (int c = 0; c < count; ++c) {
+            const Cell& cell = candidates[static_cast<std::size_t>(c)];
+            const double length = longest_segment(histogram, line_of(gate, cell.horizon, cell.bottom),
+                                                  gap_rows, 4 * kUnitsPerPixel);
+            if (length > longest) {  // candidates come by votes, so votes decide between equals
+                longest = length;
+                best = cell;
+            }
+        }
+    }
+
+    result.found = true;
+    result.lines[0] = line_of(gate, best.horizon, best.bottom);
+    result.votes[0] = best.votes;
+    std::uint32_t second = 0;
+    for (int j = 0; j < gate.count; ++j) {
+        for (int k = 1; k < bottoms_; ++k) {
+            if (votes_at(j, k) <= second) continue;
+            const Line line = line_of(gate, j, k);
+            if (nearly_same(result.lines[0], line, gate.bottom_row)) continue;
+            second = votes_at(j, k);
+            result.lines[1] = line;
+            result.votes[1] = second;
+        }
+    }
+    return result;
+}
+
+Line refine_line(const RowHistogram& histogram, const Line& start, int cap) {
+    constexpr std::array<double, 8> kTolerancesPx = {3.0, 3.0, 2.0, 2.0, 1.5, 1.5, 1.5, 1.5};
+    Line line = start;
+    const double middle_row = histogram.row_of(histogram.cells.height / 2);
+    for (const double tolerance : kTolerancesPx) {
+        double w = 0.0, wv = 0.0, wvv = 0.0, wd = 0.0, wvd = 0.0;
+        int rows = 0;
+        for (int i = 0; i < histogram.cells.height; ++i) {
+            const double row = histogram.row_of(i);
+            const double expected = line.at(row);
+            if (expected < 1.0) continue;
+            const double reach = std::min(tolerance, 0.5 + 0.25 * expected);
+            const double centre = (expected - histogram.first_px) * histogram.bins_per_px;
+            const double reach_bins = reach * histogram.bins_per_px;
+            if (centre - reach_bins >= histogram.cells.width || centre + reach_bins < 0.0) continue;
+            const int first = std::max(0, static_cast<int>(std::ceil(centre - reach_bins)));
+            const int last =
+                std::min(histogram.cells.width - 1, static_cast<int>(std::floor(centre + reach_bins)));
+            const std::uint16_t* cells = histogram.cells.row(i);
+            const double v = row - middle_row;
+            bool used = false;
+            for (int k = first; k <= last; ++k) {
+                if (cells[k] == 0) continue;
+                const double d_px = histogram.px_of(k);
+                const double t = (d_px - expected) / reach;
+                const double inside = 1.0 - t * t;
+                if (inside <= 0.0) continue;
+                const double weight = inside * inside * std::min<int>(cells[k], cap);
+                w += weight;
+                wv += weight * v;
+                wvv += weight * v * v;
+                wd += weight * d_px;
+                wvd += weight * v * d_px;
+                used = true;
+            }
+            rows += used ? 1 : 0;
+        }
+        const double determinant = w * wvv - wv * wv;
+        if (rows < 8 || determinant <= 1e-6 * w * wvv) return start;
+        const double slope = (w * wvd - wv * wd) / determinant;
+        if (slope <= 0.0) return start;
+        const double at_middle = (wd - slope * wv) / w;
+        line = {middle_row - at_middle / slope, slope};
+    }
+    return line;
+}
+
+double longest_segment(const RowHistogram& histogram, const Line& line, double gap_rows, int least) {
+    double longest = 0.0;
+    double run_start = 0.0;  // rows run downward in index, upward in the picture: from the bottom row
+    double last_supported = 0.0;
+    bool in_run = false;
+    for (int i = histogram.cells.height - 1; i >= 0; --i) {
+        const double row = histogram.row_of(i);
+        const double expected = line.at(row);
+        if (expected < 1.0) break;
+        const std::uint16_t* cells = histogram.cells.row(i);
+        int mass = 0;
+        for (int k = 0; k < histogram.cells.width; ++k)
+            mass += cells[k];
+        const int near = mass_near(histogram, cells, expected, 1.0);
+        if (near < least || near * 10LL < mass) continue;
+        if (!in_run || last_supported - row > gap_rows + histogram.row_step) run_start = row;
+        in_run = true;
+        last_supported = row;
+        longest = std::max(longest, run_start - row + histogram.row_step);
+    }
+    return longest;
+}
+
+}  // namespace groundline::terrain

@@ -1,6 +1,7 @@
 // The ground line: a Hough transform over the horizon row and the disparity at the bottom row.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 
@@ -40,11 +41,12 @@ struct LineGate {
     std::span<double> slope_max;
 };
 
+// The best line and the best of those that are not nearly the same; votes 0 where there is none.
 struct HoughResult {
+    static constexpr int kPeaks = 2;
     bool found = false;
-    Line line;
-    double votes = 0.0;
-    double second_ratio = 0.0;  // votes of the best line that is not nearly the same, over `votes`
+    std::array<Line, kPeaks> lines{};
+    std::array<double, kPeaks> votes{};
 };
 
 // Votes, a row's strongest maxima each for every line of the gate through it: any number of rows, bounded
@@ -55,7 +57,7 @@ class Hough {
     static constexpr int kMaxHorizons = 192;
     static constexpr int kMaxBottoms = 384;
 
-    void take(Arena& arena, int max_rows, int max_bins);
+    void take(Arena& arena);
 
     // `cap` is the most one maximum votes, in units of the histogram, so that a wall's cell cannot outvote
     // many rows of ground. Lines whose disparity at the bottom row exceeds bottom_max_px are not considered.
@@ -76,7 +78,7 @@ class Hough {
 
     std::span<std::uint32_t> votes_;     // [horizon][bottom], rows of kMaxBottoms
     std::span<std::uint32_t> smoothed_;  // sums of 3 x 3
-    std::span<double> inverse_;          // 1 / (rows below the horizon), by their number
+    std::span<double> inverse_;          // of the rows from each horizon to the voting row
     int bottoms_ = 0;
     double bottom_step_ = 0.5;
 };

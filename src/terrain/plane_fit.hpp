@@ -15,12 +15,14 @@ struct PlaneFitResult {
     bool found = false;
     DisparityPlane plane;                // of measured disparity
     std::array<double, 9> covariance{};  // of (du, dv, d0)
-    double weight = 0.0;                 // sum of the weights, about the number of pixels on the plane
+    double weight = 0.0;                 // sum of the weights, about the number of samples on the plane
 };
 
-// Iteratively reweighted least squares on every second pixel of every second row: Tukey weights, tolerance
-// 5, 4, 3, 2, 1.5 px, and never more than 0.5 px + a quarter of the ground's own disparity, so that far away
-// a thing of a few decimetres is not taken for ground.
+// Iteratively reweighted least squares with Tukey weights, in two steps: converge() brings any number of
+// rough starts on a thin sample of pixels to the plane next to each, tolerance 5, 4, 3, 2, 1.5 px; fit()
+// refines the best on every second pixel of every second row. A tolerance is never more than 0.5 px + a
+// quarter of the ground's own disparity, so that far away a thing of a few decimetres is not taken for
+// ground.
 //
 // Covariance: neighbouring pixels share their matching errors, so counting them as independent would
 // understate it by a factor of 5 to 30. Residuals are summed over tiles of 32 x 32 px, which do not share
@@ -31,30 +33,44 @@ class PlaneFit {
   public:
     void take(Arena& arena, int width, int height);
 
-    // `offset_px` is measured minus true disparity. found is false where too few pixels or a degenerate
-    // spread remain. Sums are in a fixed order, whatever the lanes.
-    PlaneFitResult fit(ConstDisparityMap map, const DisparityPlane& start, double offset_px,
-                       Parallel& parallel);
+    // Takes the thin sample of a frame; `offset_px` is measured minus true disparity. Call first.
+    void sample(ConstDisparityMap map, double offset_px);
+    // found is false where too few pixels or a degenerate spread remain; no covariance. May be called from
+    // several lanes at once.
+    PlaneFitResult converge(const DisparityPlane& start) const;
+    // Sums are in a fixed order, whatever the lanes.
+    PlaneFitResult fit(ConstDisparityMap map, const DisparityPlane& start, Parallel& parallel);
 
   private:
+    struct Sample {
+        float u, v, d_px;
+    };
     struct RowSums {
         double w, wu, wuu, wd, wud;
     };
     struct Score {
         double s, su, sv;
     };
+    struct Moments;
 
-    void sum_rows(ConstDisparityMap map, const DisparityPlane& plane, double offset_px, double tolerance_px,
+    void sum_rows(ConstDisparityMap map, const DisparityPlane& plane, double tolerance_px,
                   Parallel& parallel);
-    void covariance(ConstDisparityMap map, double offset_px, Parallel& parallel, PlaneFitResult& result);
+    Moments moments_of_rows() const;
+    bool improve(const Moments& moments, DisparityPlane& plane) const;
+    void covariance(ConstDisparityMap map, Parallel& parallel, PlaneFitResult& result);
 
     int width_ = 0;
     int height_ = 0;
     int tile_columns_ = 0;
     int tile_rows_ = 0;
+    int sample_step_ = 1;
+    std::size_t samples_used_ = 0;
+    double offset_px_ = 0.0;
+    std::span<Sample> samples_;
     std::span<RowSums> rows_;
     std::span<Score> tiles_;
-    std::span<double> slopes_;  // per tile row, sum of the derivative of the score
+    std::span<double> slopes_;   // per tile row, sum of the derivative of the score
+    std::span<double> weights_;  // per tile row
 };
 
 }  // namespace groundline::terrain
