@@ -28,7 +28,8 @@ class SyntheticSource final : public FrameSource {
     // The views are rectified as they come.
     const RectifiedRig& rig() const { return renderer_.scene().rig; }
     const synth::Scene& scene() const { return renderer_.scene(); }
-    // Truth of the frame that next() delivered last; rendered in this call. Valid until the next call.
+    // Truth of the frame that next() delivered last (of the first one before that), rendered in this call.
+    // The first call takes memory. Valid until the next call.
     const synth::Truth& truth(double tolerance_m);
 
   private:

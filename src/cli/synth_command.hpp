@@ -15,11 +15,15 @@ struct SynthOptions {
     double tolerance_m = 0.20;           // of the classes
 };
 
-// Writes left/ right/ disp/ occluded/ class/ height/ (a PNG per frame, %06d from 0), calib.txt (KITTI P0:,
-// P1:) and truth.json. Each file comes complete under its name or not at all; truth.json is last. Returns the
-// exit status: 0, 1 when a file could not be written, 130 after Ctrl-C where `interrupted` says so. Throws
-// Refusal before anything is written: kUsage for a bad scene or number, kInput for a folder that holds
-// something else.
+// Writes, with a PNG per frame, %06d from 0:
+//   left/ (colour) right/ (luma)
+//   disp/      16 bits, exact disparity x 256, 0 where there is sky or it does not fit; hidden points
+//   included occluded/  8 bits, 255 where the right view does not show the point class/     8 bits, class ids
+//   height/  16 bits, millimetres above the mean ground + 32768, 0 in the sky
+// and calib.txt (KITTI P0:, P1:) and truth.json (the pose and ground plane of each frame), which comes last.
+// Each file is complete under its name or not there. Returns the exit status: 0, or 130 after Ctrl-C with the
+// frames so far complete. Throws Refusal before anything is written: kUsage for a bad scene or tolerance,
+// kInput for a folder that holds something else or cannot be made; std::runtime_error for a failing disk.
 int run_synth(const SynthOptions& options);
 
 }  // namespace groundline::cli

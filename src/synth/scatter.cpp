@@ -61,7 +61,9 @@ void place_apart(std::vector<Thing>& things, Thing thing, double from_z, double 
             const double dx = other.x_m - thing.x_m;
             const double dz = other.z_m - thing.z_m;
             const double apart = reach_m(other) + reach_m(thing) + kGap_m;
-            return dx * dx + dz * dz < apart * apart;
+            const double beside = std::abs(other.x_m / other.z_m - thing.x_m / thing.z_m);
+            const bool hides = beside < reach_m(other) / other.z_m + reach_m(thing) / thing.z_m;
+            return dx * dx + dz * dz < apart * apart || (hides && attempt < kTries / 2);
         });
         if (free) {
             things.push_back(thing);
@@ -76,10 +78,10 @@ FixedVector<Thing, kStrewnPerCell> strewn_in_cell(std::uint32_t seed, std::int64
         Shape shape;
         double chance;
     };
-    constexpr Place kPlaces[kStrewnPerCell] = {{Shape::kBox, 0.6},  {Shape::kBox, 0.4},  {Shape::kPole, 0.6},
-                                               {Shape::kRock, 0.9}, {Shape::kRock, 0.9}, {Shape::kRock, 0.6}};
+    constexpr Place kPlaces[kStrewnPerCell] = {{Shape::kBox, 0.7},  {Shape::kBox, 0.4},  {Shape::kPole, 0.6},
+                                               {Shape::kRock, 0.9}, {Shape::kRock, 0.9}, {Shape::kRock, 0.7}};
     constexpr double kFree_m = 0.8;
-    constexpr double kSide_m = 7.0;
+    constexpr double kSide_m = 5.5;
     FixedVector<Thing, kStrewnPerCell> found;
     const std::uint64_t cell_key = mix(seed, static_cast<std::uint64_t>(cell));
     for (std::uint64_t i = 0; i < kStrewnPerCell; ++i) {
@@ -91,7 +93,8 @@ FixedVector<Thing, kStrewnPerCell> strewn_in_cell(std::uint32_t seed, std::int64
                                      (static_cast<double>(i) + unit(mix(key, 51))) / kStrewnPerCell);
         thing.x_m = between(-kSide_m, kSide_m, key, 52);
         const double reach = reach_m(thing);
-        if (thing.z_m - reach < path_end_m && std::abs(thing.x_m) < kFree_m + reach) continue;
+        const bool in_the_way = thing.z_m - reach < path_end_m && std::abs(thing.x_m) < kFree_m + reach;
+        if (in_the_way) thing.x_m += thing.x_m < 0.0 ? -(kFree_m + reach) : kFree_m + reach;
         found.push_back(thing);
     }
     return found;

@@ -17,10 +17,11 @@ Thing random_thing(Shape shape, std::uint64_t key);
 double reach_m(const Thing& thing);
 
 // Places `thing` between the two ranges, within 40 % of the range to either side, where it touches nothing
-// that is in `things`; left out when there is no room after 100 tries. Appends it.
+// that is in `things`, and if possible neither hides nor is hidden; left out when there is no room after 100
+// tries. Appends it.
 void place_apart(std::vector<Thing>& things, Thing thing, double from_z, double to_z, std::uint64_t key);
 
-// What lies in one cell of kStrewnCell_m of an endless drive. |x| is below 7 m; up to path_end_m the strip
+// What lies in one cell of kStrewnCell_m of an endless drive. |x| is below 5.5 m; up to path_end_m the strip
 // |x| < 0.8 m stays free.
 inline constexpr double kStrewnCell_m = 3.0;
 inline constexpr int kStrewnPerCell = 6;

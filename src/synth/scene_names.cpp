@@ -2,10 +2,10 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
-#include <utility>
 #include <vector>
 
 #include "core/deterministic_math.hpp"
+#include "core/edit_distance.hpp"
 #include "core/error.hpp"
 #include "synth/scatter.hpp"
 #include "synth/scene.hpp"
@@ -147,7 +147,8 @@ constexpr Name kNames[] = {
          w.noise = 1;
          w.undulation_m = 0.03;
          w.undulation_length_m = 5;
-         w.ditch_m = 7;
+         w.ditch_m = 4;
+         w.ditch_width_m = 0.8;
          w.varied_boxes = true;
          w.strewn = true;
      }},
@@ -155,21 +156,6 @@ constexpr Name kNames[] = {
 
 [[noreturn]] void refuse(const std::string& sentence) {
     throw Refusal(ExitStatus::kUsage, sentence);
-}
-
-// Number of letters to change, add or leave out.
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-    std::vector<std::size_t> row(b.size() + 1);
-    for (std::size_t j = 0; j <= b.size(); ++j)
-        row[j] = j;
-    for (std::size_t i = 1; i <= a.size(); ++i) {
-        std::size_t diagonal = std::exchange(row[0], i);
-        for (std::size_t j = 1; j <= b.size(); ++j) {
-            const std::size_t changed = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
-            diagonal = std::exchange(row[j], std::min({changed, row[j] + 1, row[j - 1] + 1}));
-        }
-    }
-    return row[b.size()];
 }
 
 template <typename Entries>
