@@ -3,34 +3,54 @@
 #include <algorithm>
 #include <cstddef>
 
+// x86-64 builds hold each kernel twice, plain and for AVX2, and the loader picks by the processor: twice as
+// fast, the same integers. Elsewhere (and under sanitizers, which come up after the loader) there is one.
+#if defined(__x86_64__) && defined(__GLIBC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
+    !defined(__SANITIZE_THREAD__) && !defined(GROUNDLINE_PLAIN_KERNELS)
+#define GROUNDLINE_KERNEL __attribute__((target_clones("avx2", "default")))
+#else
+#define GROUNDLINE_KERNEL
+#endif
+// What kernels share must melt into them, or it would stay plain code.
+#define GROUNDLINE_PART [[gnu::always_inline]] inline
+
 namespace groundline::stereo::kernels {
 namespace {
 
 // floor(a b / 65536), the high half that every vector unit can give.
-inline std::uint16_t high_half(std::uint16_t a, std::uint16_t b) {
+GROUNDLINE_PART std::uint16_t high_half(std::uint16_t a, std::uint16_t b) {
     return static_cast<std::uint16_t>((static_cast<std::uint32_t>(a) * b) >> 16U);
 }
 
-inline Cost distance(Cost a, Cost b) {
+GROUNDLINE_PART Cost distance(Cost a, Cost b) {
     const auto difference = static_cast<Cost>(a - b);
     const auto negative = static_cast<Cost>(b - a);
     return difference > negative ? difference : negative;
 }
 
 // |other - cost| < cost / 2 in whole numbers is |other - cost| < half_up(cost); never so for cost 0.
-inline Cost half_up(Cost cost) {
+GROUNDLINE_PART Cost half_up(Cost cost) {
     return static_cast<Cost>((cost + 1) >> 1);
 }
 
 // (a + 4) / 9 for every a + 4 that 16 bits hold.
-inline Cost mean_of_nine(std::uint16_t sum) {
+GROUNDLINE_PART Cost mean_of_nine(std::uint16_t sum) {
     return static_cast<Cost>(high_half(static_cast<std::uint16_t>(sum + 4U), 58255U) >> 3U);
 }
 
+// All ones where true. With pick() instead of ?: where GCC would make branches of a long selection.
+GROUNDLINE_PART Cost mask_if(bool condition) {
+    return condition ? -1 : 0;
+}
+GROUNDLINE_PART Cost pick(Cost mask, Cost yes, Cost no) {
+    return static_cast<Cost>(no ^ ((yes ^ no) & mask));
+}
+
 template <RuleOne kRule>
-void rule_one_row(const Cost* __restrict above, const Cost* __restrict here, const Cost* __restrict below,
-                  const Cost* __restrict farther, const Cost* __restrict nearer, int width,
-                  std::uint16_t* __restrict columns, Cost* __restrict out) {
+GROUNDLINE_PART void rule_one_row(const Cost* __restrict above, const Cost* __restrict here,
+                                  const Cost* __restrict below, const Cost* __restrict farther,
+                                  const Cost* __restrict nearer, int width, std::uint16_t* __restrict columns,
+                                  Cost* __restrict out) {
     for (int x = -1; x <= width; ++x)
         columns[x + 1] = static_cast<std::uint16_t>(above[x] + here[x] + below[x]);
     for (int x = 0; x < width; ++x) {
@@ -45,12 +65,16 @@ void rule_one_row(const Cost* __restrict above, const Cost* __restrict here, con
 }
 
 template <RuleTwo kRule, bool kSums>
-void rule_two_row(const Cost* __restrict above, const Cost* __restrict here, const Cost* __restrict below,
-                  const Cost* __restrict costs, int width, Cost* __restrict out) {
+GROUNDLINE_PART void rule_two_row(const Cost* __restrict above, const Cost* __restrict here,
+                                  const Cost* __restrict below, const Cost* __restrict costs, int width,
+                                  Cost* __restrict out) {
     for (int x = 0; x < width; ++x) {
         const Cost cost = here[x];
         const Cost half = half_up(cost);
-        const auto supports = [&](Cost other) -> Cost { return distance(other, cost) < half ? 1 : 0; };
+        // Counted downwards, as the all-ones masks that comparisons are; GCC 12 adds ones wrongly here.
+        const auto supports = [&](Cost other) __attribute__((always_inline))->Cost {
+            return distance(other, cost) < half ? -1 : 0;
+        };
         Cost count = kRule == RuleTwo::kSevenOfNine ? supports(cost) : Cost{0};
         count = static_cast<Cost>(count + supports(above[x - 1]));
         count = static_cast<Cost>(count + supports(above[x]));
@@ -63,14 +87,15 @@ void rule_two_row(const Cost* __restrict above, const Cost* __restrict here, con
         const auto whole = static_cast<std::uint16_t>(costs[x]);
         const auto scaled = static_cast<Cost>(kSums ? static_cast<std::uint16_t>(10U * whole / 13U)
                                                     : high_half(whole, 50413U));
-        out[x] = count > 6 ? scaled : costs[x];
+        out[x] = count <= -7 ? scaled : costs[x];
     }
 }
 
 }  // namespace
 
-void truncated_differences(const std::uint8_t* __restrict left, const std::uint8_t* __restrict right,
-                           int width, int disparity, int truncation, std::uint8_t* __restrict out) {
+GROUNDLINE_KERNEL void truncated_differences(const std::uint8_t* __restrict left,
+                                             const std::uint8_t* __restrict right, int width, int disparity,
+                                             int truncation, std::uint8_t* __restrict out) {
     const auto most = static_cast<std::uint8_t>(truncation);
     const int first = std::clamp(disparity, 0, width);
     const int last = std::clamp(width + disparity, 0, width);
@@ -87,8 +112,8 @@ void truncated_differences(const std::uint8_t* __restrict left, const std::uint8
         out[x] = most;
 }
 
-void weigh_down(const std::array<const std::uint8_t*, 2 * kWindowReach + 1>& rows, const WindowTaps& taps,
-                int width, std::uint16_t* __restrict out) {
+GROUNDLINE_KERNEL void weigh_down(const std::array<const std::uint8_t*, 2 * kWindowReach + 1>& rows,
+                                  const WindowTaps& taps, int width, std::uint16_t* __restrict out) {
     const std::uint8_t *r0 = rows[0], *r1 = rows[1], *r2 = rows[2], *r3 = rows[3], *r4 = rows[4],
                        *r5 = rows[5], *r6 = rows[6], *r7 = rows[7], *r8 = rows[8], *r9 = rows[9],
                        *r10 = rows[10];
@@ -104,8 +129,8 @@ void weigh_down(const std::array<const std::uint8_t*, 2 * kWindowReach + 1>& row
     }
 }
 
-void weigh_across(const std::uint16_t* __restrict in, const WindowTaps& taps, int width,
-                  Cost* __restrict out) {
+GROUNDLINE_KERNEL void weigh_across(const std::uint16_t* __restrict in, const WindowTaps& taps, int width,
+                                    Cost* __restrict out) {
     const std::uint16_t g0 = taps[0], g1 = taps[1], g2 = taps[2], g3 = taps[3], g4 = taps[4], g5 = taps[5];
     for (int x = 0; x < width; ++x) {
         const std::uint16_t p0 = in[x];  // at most 256 * 28, pairs twice that
@@ -126,56 +151,49 @@ void weigh_across(const std::uint16_t* __restrict in, const WindowTaps& taps, in
     }
 }
 
-void rule_one(RuleOne rule, const Rows& rows, const Cost* farther, const Cost* nearer, int width,
-              std::uint16_t* columns, Cost* out) {
-    switch (rule) {
-        case RuleOne::kOff:
-            std::copy_n(rows.here, width, out);
-            return;
-        case RuleOne::kMean9:
-            rule_one_row<RuleOne::kMean9>(rows.above, rows.here, rows.below, farther, nearer, width, columns,
-                                          out);
-            return;
-        case RuleOne::kSum9:
-            rule_one_row<RuleOne::kSum9>(rows.above, rows.here, rows.below, farther, nearer, width, columns,
-                                         out);
-            return;
-    }
+GROUNDLINE_KERNEL void rule_one(RuleOne rule, const Rows& rows, const Cost* farther, const Cost* nearer,
+                                int width, std::uint16_t* columns, Cost* out) {
+    const auto [above, here, below] = rows;
+    if (rule == RuleOne::kOff)
+        std::copy_n(here, width, out);
+    else if (rule == RuleOne::kMean9)
+        rule_one_row<RuleOne::kMean9>(above, here, below, farther, nearer, width, columns, out);
+    else
+        rule_one_row<RuleOne::kSum9>(above, here, below, farther, nearer, width, columns, out);
 }
 
-void rule_two(RuleTwo rule, bool sums, const Rows& looked_at, const Cost* costs, int width, Cost* out) {
-    const auto apply = [&](auto row) {
-        row(looked_at.above, looked_at.here, looked_at.below, costs, width, out);
-    };
-    switch (rule) {
-        case RuleTwo::kOff:
-            std::copy_n(costs, width, out);
-            return;
-        case RuleTwo::kSevenOfEight:
-            sums ? apply(rule_two_row<RuleTwo::kSevenOfEight, true>)
-                 : apply(rule_two_row<RuleTwo::kSevenOfEight, false>);
-            return;
-        case RuleTwo::kSevenOfNine:
-            sums ? apply(rule_two_row<RuleTwo::kSevenOfNine, true>)
-                 : apply(rule_two_row<RuleTwo::kSevenOfNine, false>);
-            return;
-    }
+GROUNDLINE_KERNEL void rule_two(RuleTwo rule, bool sums, const Rows& looked_at, const Cost* costs, int width,
+                                Cost* out) {
+    const auto [above, here, below] = looked_at;
+    if (rule == RuleTwo::kOff)
+        std::copy_n(costs, width, out);
+    else if (rule == RuleTwo::kSevenOfEight && !sums)
+        rule_two_row<RuleTwo::kSevenOfEight, false>(above, here, below, costs, width, out);
+    else if (rule == RuleTwo::kSevenOfEight)
+        rule_two_row<RuleTwo::kSevenOfEight, true>(above, here, below, costs, width, out);
+    else if (!sums)
+        rule_two_row<RuleTwo::kSevenOfNine, false>(above, here, below, costs, width, out);
+    else
+        rule_two_row<RuleTwo::kSevenOfNine, true>(above, here, below, costs, width, out);
 }
 
-void select(const Cost* __restrict costs, int index, int width, const Winners& winners) {
+GROUNDLINE_KERNEL void select(const Cost* __restrict costs, int index, int width, const Winners& winners) {
     Cost* __restrict best = winners.best;
     std::int16_t* __restrict best_index = winners.index;
     const auto now = static_cast<std::int16_t>(index);
+#pragma GCC ivdep
     for (int x = 0; x < width; ++x) {
-        const bool wins = costs[x] < best[x];
-        best[x] = wins ? costs[x] : best[x];
-        best_index[x] = wins ? now : best_index[x];
+        const Cost cost = costs[x];
+        const Cost old_best = best[x];
+        const std::int16_t old_index = best_index[x];
+        best[x] = cost < old_best ? cost : old_best;
+        best_index[x] = cost < old_best ? now : old_index;
     }
 }
 
-void select_with_evidence(const Cost* __restrict costs, const Cost* __restrict refined,
-                          const Cost* __restrict refined_before, int index, int width,
-                          const Winners& winners) {
+GROUNDLINE_KERNEL void select_with_evidence(const Cost* __restrict costs, const Cost* __restrict refined,
+                                            const Cost* __restrict refined_before, int index, int width,
+                                            const Winners& winners) {
     Cost* __restrict best = winners.best;
     Cost* __restrict before = winners.before;
     Cost* __restrict second = winners.second;
@@ -185,36 +203,46 @@ void select_with_evidence(const Cost* __restrict costs, const Cost* __restrict r
     std::int16_t* __restrict best_index = winners.index;
     const auto now = static_cast<std::int16_t>(index);
     const auto previous = static_cast<std::int16_t>(index - 1);
+#pragma GCC ivdep
     for (int x = 0; x < width; ++x) {
+        // Everything is read and written whatever wins: a loop without branches.
         const Cost cost = costs[x];
         const Cost old_best = best[x];
+        const Cost old_before = before[x];
+        const Cost old_second = second[x];
+        const Cost old_lower = lower[x];
+        const Cost old_centre = centre[x];
+        const Cost old_upper = upper[x];
+        const Cost here = refined[x];
+        const Cost there = refined_before[x];
         const std::int16_t old_index = best_index[x];
-        const bool wins = cost < old_best;
-        const bool follows = old_index == previous;
+        const Cost wins = mask_if(cost < old_best);
         // Against a new winner stands the lowest cost of all disparities but the last two; against the old
         // one, this cost too once it is more than one disparity away.
-        const Cost challenger = old_index < previous && cost < second[x] ? cost : second[x];
-        second[x] = wins ? before[x] : challenger;
+        const Cost rival = old_index < previous ? cost : kNoCost;
+        const Cost challenger = rival < old_second ? rival : old_second;
+        second[x] = pick(wins, old_before, challenger);
         before[x] = old_best;
-        best[x] = wins ? cost : old_best;
-        best_index[x] = wins ? now : old_index;
-        lower[x] = wins ? refined_before[x] : lower[x];
-        centre[x] = wins ? refined[x] : centre[x];
-        upper[x] = follows ? refined[x] : upper[x];
+        best[x] = pick(wins, cost, old_best);
+        best_index[x] = pick(wins, now, old_index);
+        lower[x] = pick(wins, there, old_lower);
+        centre[x] = pick(wins, here, old_centre);
+        upper[x] = pick(mask_if(old_index == previous), here, old_upper);
     }
 }
 
-void select_right(const Cost* __restrict costs, int index, int disparity, int width, Cost* __restrict best,
-                  std::int16_t* __restrict best_index) {
+GROUNDLINE_KERNEL void select_right(const Cost* __restrict costs, int index, int disparity, int width,
+                                    Cost* __restrict best, std::int16_t* __restrict best_index) {
     const int first = std::clamp(-disparity, 0, width);
     const int last = std::clamp(width - disparity, 0, width);
     const auto now = static_cast<std::int16_t>(index);
     const std::ptrdiff_t shift = disparity;
     for (int x = first; x < last; ++x) {
         const Cost cost = costs[x + shift];
-        const bool wins = cost < best[x];
-        best[x] = wins ? cost : best[x];
-        best_index[x] = wins ? now : best_index[x];
+        const Cost old_best = best[x];
+        const std::int16_t old_index = best_index[x];
+        best[x] = cost < old_best ? cost : old_best;
+        best_index[x] = cost < old_best ? now : old_index;
     }
 }
 
