@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -35,7 +36,7 @@ struct RunOptions {
 // A required sink's failure ends the run (results on disk); another's is only counted (the network).
 struct SinkSlot {
     Sink* sink = nullptr;
-    Stage stage = Stage::kWrite;
+    std::optional<Stage> stage;  // whose time it is
     bool required = true;
 };
 

@@ -6,9 +6,9 @@
 #include <limits>
 #include <utility>
 
+#include "core/edit_distance.hpp"
 #include "core/error.hpp"
 #include "core/result.hpp"
-#include "settings/edit_distance.hpp"
 #include "settings/key.hpp"
 #include "settings/settings.hpp"
 
@@ -259,7 +259,7 @@ std::vector<Key> make_keys() {
     keys.push_back(text("publish.url", "an LCM URL",
                         "LCM provider; empty: LCM_DEFAULT_URL, else the library's.",
                         GROUNDLINE_MEMBER(publish.url)));
-    keys.push_back(text("publish.prefix", "a word", "In front of every channel name.",
+    keys.push_back(text("publish.prefix", "a word", "Channels are PREFIX_MASK, PREFIX_SECTORS and so on.",
                         GROUNDLINE_MEMBER(publish.prefix)));
     keys.push_back(on_off("publish.v_disparity", "Publish the v-disparity image too.",
                           GROUNDLINE_MEMBER(publish.v_disparity)));

@@ -25,8 +25,8 @@ struct MountSettings {
 };
 
 struct PublishSettings {
-    std::string url;                     // empty: LCM_DEFAULT_URL, else the library's default
-    std::string prefix = "GROUNDLINE_";  // of every channel
+    std::string url;                    // empty: LCM_DEFAULT_URL, else the library's default
+    std::string prefix = "GROUNDLINE";  // channels are PREFIX_MASK, PREFIX_SECTORS, ...
     bool v_disparity = false;
     bool preview = false;
 };

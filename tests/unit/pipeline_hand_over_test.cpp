@@ -38,8 +38,8 @@ Seen race(HandOver<Item>& hand_over, std::uint64_t items, int consumer_spins) {
     std::thread consumer([&] {
         while (const Item* item = hand_over.take()) {
             seen.whole = seen.whole && item->whole();
-            for (volatile int spin = 0; spin < consumer_spins; spin = spin + 1) {
-            }
+            for (int spin = 0; spin < consumer_spins; ++spin)
+                std::atomic_signal_fence(std::memory_order_seq_cst);
             seen.whole = seen.whole && item->whole();
             seen.numbers.push_back(item->number);
             hand_over.release();

@@ -8,8 +8,8 @@
 #include <set>
 #include <sstream>
 
+#include "core/edit_distance.hpp"
 #include "core/error.hpp"
-#include "settings/edit_distance.hpp"
 #include "settings/key.hpp"
 
 namespace groundline::settings {

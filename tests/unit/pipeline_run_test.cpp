@@ -1,0 +1,223 @@
+// The whole pipeline over a scripted source: order, losses, failures, ends, and what the hot path allocates.
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <thread>
+#include <vector>
+
+#include "pipeline/pipeline.hpp"
+#include "pipeline/worker_pool.hpp"
+#include "support/allocation_count.hpp"
+
+namespace groundline::pipeline {
+namespace {
+
+constexpr int kWidth = 96;
+constexpr int kHeight = 64;
+
+// Textured pairs shifted by 5 px; positions listed in `bad` cannot be read. Allocates nothing in next().
+class ScriptedSource final : public FrameSource {
+  public:
+    explicit ScriptedSource(std::int64_t length, std::vector<std::int64_t> bad = {}) : bad_(std::move(bad)) {
+        info_.name = "scripted";
+        info_.width = kWidth;
+        info_.height = kHeight;
+        info_.length = length;
+    }
+    const SourceInfo& info() const override { return info_; }
+    Pull next(StereoFrame& frame) override {
+        if (position_ == info_.length) return Pull::kEnd;
+        frame.stamp = {};
+        frame.stamp.sequence = sequence_++;
+        frame.stamp.position = position_++;
+        frame.stamp.exposure_mono_ns = frame.stamp.sequence * 1'000'000;
+        for (const std::int64_t bad : bad_)
+            if (bad == frame.stamp.position) return Pull::kBad;
+        for (int y = 0; y < kHeight; ++y) {
+            for (int x = 0; x < kWidth; ++x) {
+                frame.left.row(y)[x] = texture(x, y);
+                frame.right.row(y)[x] = texture(x + 5, y);
+            }
+        }
+        return Pull::kFrame;
+    }
+    const std::string& error() const override { return error_; }
+    bool rewind() override {
+        position_ = 0;
+        return true;
+    }
+
+  private:
+    static std::uint8_t texture(int x, int y) {
+        std::uint32_t hash =
+            static_cast<std::uint32_t>(x) * 0x9E3779B1U ^ static_cast<std::uint32_t>(y) * 0x85EBCA77U;
+        hash = (hash ^ (hash >> 15U)) * 0x2C1B3C6DU;
+        return static_cast<std::uint8_t>(hash >> 24U);
+    }
+
+    SourceInfo info_;
+    std::vector<std::int64_t> bad_;
+    std::int64_t position_ = 0;
+    std::int64_t sequence_ = 0;
+    std::string error_ = "";
+};
+
+class RecordingSink final : public Sink {
+  public:
+    bool consume(const FrameResult& result) override {
+        if (delay_ms > 0) std::this_thread::sleep_for(std::chrono::milliseconds(delay_ms));
+        if (static_cast<std::int64_t>(positions.size()) == fail_after) return false;
+        positions.push_back(result.stamp.position);
+        if (allocations_by_frame.capacity() > allocations_by_frame.size())
+            allocations_by_frame.push_back(test::allocations());
+        std::uint64_t hash = 1469598103934665603ULL;
+        const auto mix = [&](std::uint64_t value) { hash = (hash ^ value) * 1099511628211ULL; };
+        for (int y = 0; y < result.mask.height; ++y) {
+            for (int x = 0; x < result.mask.width; ++x) {
+                mix(static_cast<std::uint64_t>(result.disparity.disparity_q4.at(x, y)));
+                mix(static_cast<std::uint64_t>(result.disparity.invalid.at(x, y)));
+                mix(static_cast<std::uint64_t>(result.mask.at(x, y)));
+            }
+        }
+        hashes.push_back(hash);
+        return true;
+    }
+    const std::string& error() const override { return error_; }
+
+    int delay_ms = 0;
+    std::int64_t fail_after = -1;
+    std::vector<std::int64_t> positions;
+    std::vector<std::uint64_t> hashes;
+    std::vector<std::uint64_t> allocations_by_frame;
+
+  private:
+    std::string error_ = "the disk is full";
+};
+
+struct Run {
+    RunReport report;
+    Counters counters;
+    std::vector<std::int64_t> bad;
+};
+
+std::unique_ptr<Run> run_pipeline(FrameSource& source, RecordingSink& sink, RunOptions options, int threads,
+                                  const std::atomic<bool>& stop) {
+    auto run = std::make_unique<Run>();
+    sink.positions.reserve(100000);
+    sink.hashes.reserve(100000);
+    Arena arena;
+    const rig::Rectifier rectifier(kWidth, kHeight);
+    WorkerPool pool(threads);
+    ProcessorConfig config;
+    config.matcher.disparities = 16;
+    Processor processor(config, rectifier, pool, arena);
+    const std::array<SinkSlot, 1> sinks{{{&sink, Stage::kWrite, true}}};
+    Pipeline pipeline(source, processor, sinks, options.pace == Pace::kMax, arena, run->counters);
+    arena.seal();
+    pipeline.run(
+        options, stop,
+        [&](const FrameStamp& stamp, const std::string&) { run->bad.push_back(stamp.position); },
+        run->report);
+    return run;
+}
+
+const std::atomic<bool> kNeverStop{false};
+
+TEST(Pipeline, LosslessDeliversEveryFrameInOrderToASlowSink) {
+    ScriptedSource source(40);
+    RecordingSink sink;
+    sink.delay_ms = 2;
+    const auto run = run_pipeline(source, sink, {}, 2, kNeverStop);
+    ASSERT_EQ(sink.positions.size(), 40U);
+    for (std::int64_t i = 0; i < 40; ++i)
+        EXPECT_EQ(sink.positions[static_cast<std::size_t>(i)], i);
+    EXPECT_EQ(run->counters.get(Count::kResultsDelivered), 40U);
+    EXPECT_EQ(run->counters.get(Count::kFramesOverwritten), 0U);
+    EXPECT_EQ(run->counters.get(Count::kResultsOverwritten), 0U);
+    EXPECT_FALSE(run->report.interrupted);
+}
+
+TEST(Pipeline, ResultsDoNotDependOnThreadsOrRuns) {
+    std::vector<std::uint64_t> first;
+    for (const int threads : {1, 2, 3, 1}) {
+        ScriptedSource source(5);
+        RecordingSink sink;
+        run_pipeline(source, sink, {}, threads, kNeverStop);
+        if (first.empty()) first = sink.hashes;
+        EXPECT_EQ(sink.hashes, first) << threads << " threads";
+    }
+    ASSERT_EQ(first.size(), 5U);
+}
+
+TEST(Pipeline, ABadPairIsCountedAndTheRunGoesOn) {
+    ScriptedSource source(10, {3, 7});
+    RecordingSink sink;
+    const auto run = run_pipeline(source, sink, {}, 1, kNeverStop);
+    EXPECT_EQ(run->bad, (std::vector<std::int64_t>{3, 7}));
+    EXPECT_EQ(run->counters.get(Count::kFramesBad), 2U);
+    EXPECT_EQ(sink.positions, (std::vector<std::int64_t>{0, 1, 2, 4, 5, 6, 8, 9}));
+}
+
+TEST(Pipeline, NewestFirstCountsEveryLoss) {
+    ScriptedSource source(200);
+    RecordingSink sink;
+    sink.delay_ms = 10;
+    RunOptions options;
+    options.pace = Pace::kFixed;
+    options.rate_hz = 1000.0;
+    const auto run = run_pipeline(source, sink, options, 1, kNeverStop);
+    const Counters& counters = run->counters;
+    EXPECT_LT(sink.positions.size(), 200U) << "a sink of 10 ms cannot keep up with 1000 Hz";
+    EXPECT_EQ(sink.positions.back(), 199) << "the newest is always delivered";
+    EXPECT_EQ(counters.get(Count::kFramesRead), 200U);
+    EXPECT_EQ(counters.get(Count::kFramesProcessed) + counters.get(Count::kFramesOverwritten), 200U);
+    EXPECT_EQ(counters.get(Count::kResultsDelivered) + counters.get(Count::kResultsOverwritten),
+              counters.get(Count::kFramesProcessed));
+}
+
+TEST(Pipeline, ARequiredSinksFailureEndsTheRun) {
+    ScriptedSource source(1000000);
+    RecordingSink sink;
+    sink.fail_after = 3;
+    const auto run = run_pipeline(source, sink, {}, 1, kNeverStop);
+    EXPECT_EQ(run->report.sink_error, "the disk is full");
+    EXPECT_EQ(sink.positions.size(), 3U);
+    EXPECT_LT(run->counters.get(Count::kFramesRead), 20U);
+}
+
+TEST(Pipeline, StopsWhenAskedAndDeliversWhatIsInFlight) {
+    ScriptedSource source(1000000);
+    RecordingSink sink;
+    sink.delay_ms = 1;
+    std::atomic<bool> stop{false};
+    std::thread stopper([&] {
+        std::this_thread::sleep_for(std::chrono::milliseconds(100));
+        stop = true;
+    });
+    const auto run = run_pipeline(source, sink, {}, 2, stop);
+    stopper.join();
+    EXPECT_TRUE(run->report.interrupted);
+    EXPECT_EQ(sink.positions.size(), run->counters.get(Count::kFramesRead));
+}
+
+TEST(Pipeline, LoopsAndHonoursTheFrameLimit) {
+    ScriptedSource source(4);
+    RecordingSink sink;
+    RunOptions options;
+    options.loop = true;
+    options.frames = 10;
+    run_pipeline(source, sink, options, 1, kNeverStop);
+    EXPECT_EQ(sink.positions, (std::vector<std::int64_t>{0, 1, 2, 3, 0, 1, 2, 3, 0, 1}));
+}
+
+TEST(Pipeline, SteadyStateAllocatesNothing) {
+    ScriptedSource source(60);
+    RecordingSink sink;
+    sink.allocations_by_frame.reserve(60);
+    run_pipeline(source, sink, {}, 3, kNeverStop);
+    ASSERT_EQ(sink.allocations_by_frame.size(), 60U);
+    EXPECT_EQ(sink.allocations_by_frame[59], sink.allocations_by_frame[2]);
+}
+
+}  // namespace
+}  // namespace groundline::pipeline
