@@ -4,121 +4,171 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 
 namespace groundline::rig {
 namespace {
 
-constexpr int kLevels = 256;
-constexpr int kFirstPercent = 5;
-constexpr int kLastPercent = 95;
-constexpr std::size_t kRanks = kLastPercent - kFirstPercent + 1;
-// Bands per view: enough tasks for any small board, and 16 kB of histograms fit on the stack.
+constexpr std::size_t kLevels = 256;
+// Enough to keep sky and ground apart, few enough that 16 kB of histograms fit on the stack; 16 or 32 bands
+// are only 0.05 grey levels better.
 constexpr int kBands = 8;
+constexpr int kRanksPerBand = 17;  // 10 %, 15 % .. 90 %
 
-using Histogram = std::array<std::uint32_t, kLevels>;
-using Quantiles = std::array<double, kRanks>;
-
-void count_rows(ConstLuma image, int first, int end, Histogram& histogram) {
-    for (int y = first; y < end; ++y) {
-        const std::uint8_t* row = image.row(y);
-        for (int x = 0; x < image.width; ++x)
-            ++histogram[row[x]];
+class Histogram {
+  public:
+    void add_rows(ConstLuma image, int first, int end) {
+        for (int y = first; y < end; ++y) {
+            const std::uint8_t* row = image.row(y);
+            for (int x = 0; x < image.width; ++x)
+                ++counts_[row[x]];
+        }
+        pixels_ += static_cast<std::uint32_t>(end - first) * static_cast<std::uint32_t>(image.width);
     }
-}
-
-// Grey level below which `percent` of the pixels lie, with the pixels of a level spread evenly over it: the
-// level alone would be too coarse to tell a gain of 1.02.
-Quantiles quantiles_of(const Histogram& histogram, double pixels) {
-    Quantiles values{};
-    std::size_t level = 0;
-    double below = 0.0;
-    for (std::size_t i = 0; i < kRanks; ++i) {
-        const double wanted = pixels * static_cast<double>(kFirstPercent + static_cast<int>(i)) / 100.0;
-        while (level + 1 < kLevels && below + histogram[level] < wanted)
-            below += histogram[level++];
-        values[i] = static_cast<double>(level) - 0.5 + (wanted - below) / std::max(1U, histogram[level]);
+    void add(const Histogram& other) {
+        for (std::size_t level = 0; level < kLevels; ++level)
+            counts_[level] += other.counts_[level];
+        pixels_ += other.pixels_;
     }
-    return values;
-}
+    bool empty() const { return pixels_ == 0; }
+    // Grey level below which `percent` of the pixels lie, the pixels of a level spread evenly over it: whole
+    // levels would be too coarse to tell a gain of 1.02. From -0.5 to 255.5.
+    double quantile(double percent) const {
+        const double wanted = pixels_ * percent / 100.0;
+        std::size_t level = 0;
+        double below = 0.0;
+        while (level + 1 < kLevels && below + counts_[level] < wanted)
+            below += counts_[level++];
+        return static_cast<double>(level) - 0.5 + (wanted - below) / std::max(1U, counts_[level]);
+    }
+    double share_within(std::size_t first, std::size_t last) const {
+        double count = 0.0;
+        for (std::size_t level = first; level <= last; ++level)
+            count += counts_[level];
+        return count / pixels_;
+    }
 
-double share_up_to(const Histogram& histogram, int level, double pixels) {
-    double count = 0.0;
-    for (int i = 0; i <= level; ++i)
-        count += histogram[static_cast<std::size_t>(i)];
-    return count / pixels;
-}
-
-struct Line {
-    double gain = 1.0;
-    double offset = 0.0;
+  private:
+    std::array<std::uint32_t, kLevels> counts_{};
+    std::uint32_t pixels_ = 0;
 };
 
-// Least squares of left on right, reweighted (Tukey, 4 grey levels) so that a bright thing that only one view
-// sees does not bend it. Ranks where a view is at its end of scale tell nothing about the gain.
-Line fit_line(const Quantiles& left, const Quantiles& right) {
-    constexpr double kCut = 4.0;
-    constexpr int kRounds = 10;
-    Line line;
-    for (int round = 0; round < kRounds; ++round) {
-        double sum = 0.0, sum_x = 0.0, sum_y = 0.0, sum_xx = 0.0, sum_xy = 0.0;
-        for (std::size_t i = 0; i < kRanks; ++i) {
-            const double x = right[i];
-            const double y = left[i];
-            if (x < 1.0 || y < 1.0 || x > 254.0 || y > 254.0) continue;
-            double weight = 1.0;
-            if (round > 0) {
-                const double relative = (y - line.gain * x - line.offset) / kCut;
-                const double rest = 1.0 - relative * relative;
-                weight = rest > 0.0 ? rest * rest : 0.0;
-            }
-            sum += weight;
-            sum_x += weight * x;
-            sum_y += weight * y;
-            sum_xx += weight * x * x;
-            sum_xy += weight * x * y;
+// Brightness of one rank in both views.
+struct Match {
+    double left;
+    double right;
+    double weight;
+};
+
+class Matches {
+  public:
+    // Ranks where a view is near an end of its scale tell nothing about the gain and are left out.
+    void add_band(const Histogram& left, const Histogram& right) {
+        constexpr double kLowest = 3.0;
+        constexpr double kHighest = 250.0;
+        for (int rank = 0; rank < kRanksPerBand; ++rank) {
+            const double percent = 10.0 + 5.0 * rank;
+            const Match match = {left.quantile(percent), right.quantile(percent), 0.0};
+            if (std::min(match.left, match.right) < kLowest || std::max(match.left, match.right) > kHighest)
+                continue;
+            // What only one view sees shifts the ranks; between two brightnesses of which there is little in
+            // the picture that moves a quantile far.
+            const double spacing = std::max(left.quantile(percent + 3.0) - left.quantile(percent - 3.0),
+                                            right.quantile(percent + 3.0) - right.quantile(percent - 3.0));
+            matches_[count_++] = {match.left, match.right, 1.0 / (1.0 + 0.1 * spacing * spacing)};
         }
-        if (sum < 10.0) break;
-        const double spread = sum_xx / sum - (sum_x / sum) * (sum_x / sum);
-        // Fewer than 2 grey levels of spread cannot tell gain from offset.
-        const double gain = spread > 4.0 ? (sum_xy / sum - (sum_x / sum) * (sum_y / sum)) / spread : 1.0;
-        line = {gain, sum_y / sum - gain * sum_x / sum};
     }
-    return line;
-}
+
+    struct Line {
+        bool found = false;
+        double gain = 1.0;
+        double offset = 0.0;
+    };
+
+    // Least squares reweighted by Tukey's function, whose reach narrows from 32 to 8 grey levels.
+    Line fit() const {
+        constexpr int kWideRounds = 10;
+        constexpr int kRounds = 30;
+        // Of all weight: with less, the line would speak for a small part of the picture.
+        constexpr double kLeastSupport = 0.3;
+        Line line;
+        double all = 0.0;
+        for (std::size_t i = 0; i < count_; ++i)
+            all += matches_[i].weight;
+        for (int round = 0; round < kRounds; ++round) {
+            const double reach = round < kWideRounds ? 32.0 : 8.0;
+            double sum = 0.0, sum_x = 0.0, sum_y = 0.0, sum_xx = 0.0, sum_xy = 0.0;
+            for (std::size_t i = 0; i < count_; ++i) {
+                const double x = matches_[i].right;
+                const double y = matches_[i].left;
+                double weight = matches_[i].weight;
+                if (round > 0) {
+                    const double relative = (y - line.gain * x - line.offset) / reach;
+                    const double rest = std::max(0.0, 1.0 - relative * relative);
+                    weight *= rest * rest;
+                }
+                sum += weight;
+                sum_x += weight * x;
+                sum_y += weight * y;
+                sum_xx += weight * x * x;
+                sum_xy += weight * x * y;
+            }
+            if (sum <= kLeastSupport * all) return {};
+            const double mean_x = sum_x / sum;
+            const double mean_y = sum_y / sum;
+            const double spread = sum_xx / sum - mean_x * mean_x;
+            // Less than 2 grey levels of spread cannot tell gain from offset.
+            line.gain = spread > 4.0 ? (sum_xy / sum - mean_x * mean_y) / spread : 1.0;
+            line.offset = mean_y - line.gain * mean_x;
+            line.found = true;
+        }
+        return line;
+    }
+
+  private:
+    std::array<Match, static_cast<std::size_t>(kBands* kRanksPerBand)> matches_{};
+    std::size_t count_ = 0;
+};
 
 }  // namespace
 
 PhotometricEvidence measure_photometric(ConstLuma left, ConstLuma right, Parallel& parallel) {
-    std::array<Histogram, 2 * kBands> parts{};
+    std::array<Histogram, kBands> left_bands;
+    std::array<Histogram, kBands> right_bands;
     parallel.for_each(2 * kBands, [&](int task, int) {
         const ConstLuma& image = task < kBands ? left : right;
         const int band = task % kBands;
-        count_rows(image, image.height * band / kBands, image.height * (band + 1) / kBands,
-                   parts[static_cast<std::size_t>(task)]);
+        (task < kBands ? left_bands : right_bands)[static_cast<std::size_t>(band)].add_rows(
+            image, image.height * band / kBands, image.height * (band + 1) / kBands);
     });
-    std::array<Histogram, 2> views{};
-    for (std::size_t task = 0; task < parts.size(); ++task)
-        for (std::size_t level = 0; level < kLevels; ++level)
-            views[task / kBands][level] += parts[task][level];
-
-    const double left_pixels = static_cast<double>(left.width) * left.height;
-    const double right_pixels = static_cast<double>(right.width) * right.height;
-    const Quantiles left_ranks = quantiles_of(views[0], left_pixels);
-    const Quantiles right_ranks = quantiles_of(views[1], right_pixels);
-    const Line line = fit_line(left_ranks, right_ranks);
+    Histogram left_all;
+    Histogram right_all;
+    Matches matches;
+    for (std::size_t band = 0; band < kBands; ++band) {
+        left_all.add(left_bands[band]);
+        right_all.add(right_bands[band]);
+        if (!left_bands[band].empty() && !right_bands[band].empty())
+            matches.add_band(left_bands[band], right_bands[band]);
+    }
+    const Matches::Line line = matches.fit();
 
     PhotometricEvidence evidence;
     evidence.gain = line.gain;
     evidence.offset = line.offset;
     double difference = 0.0;
-    for (std::size_t i = 0; i < kRanks; ++i)
-        difference += std::abs(left_ranks[i] - right_ranks[i]);
-    evidence.mismatch = difference / static_cast<double>(kRanks);
-    evidence.overexposed_share = std::max(views[0][255] / left_pixels, views[1][255] / right_pixels);
-    evidence.dark_share = std::max(share_up_to(views[0], kDarkLevel, left_pixels),
-                                   share_up_to(views[1], kDarkLevel, right_pixels));
-    evidence.contrast =
-        std::min(left_ranks.back() - left_ranks.front(), right_ranks.back() - right_ranks.front());
+    constexpr int kFirst = 5;
+    constexpr int kLast = 95;
+    for (int percent = kFirst; percent <= kLast; ++percent) {
+        const double grey = right_all.quantile(percent);
+        difference +=
+            std::abs((line.found ? line.gain * grey + line.offset : left_all.quantile(percent)) - grey);
+    }
+    evidence.mismatch = difference / (kLast - kFirst + 1);
+    evidence.overexposed_share = std::max(left_all.share_within(255, 255), right_all.share_within(255, 255));
+    evidence.dark_share =
+        std::max(left_all.share_within(0, kDarkLevel), right_all.share_within(0, kDarkLevel));
+    evidence.contrast = std::min(left_all.quantile(kLast) - left_all.quantile(kFirst),
+                                 right_all.quantile(kLast) - right_all.quantile(kFirst));
     return evidence;
 }
 

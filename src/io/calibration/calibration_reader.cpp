@@ -39,7 +39,8 @@ rig::StereoCalibration read_yaml(const std::vector<SourceText>& sources) {
     };
     switch (format) {
         case Format::kRos:
-            need_files(2, "is the camera_info of one camera, expected two files: left,right");
+            need_files(
+                2, "is a calibration of one camera, expected ROS camera_info of both: left.yaml,right.yaml");
             return read_ros_pair(files[0], files[1]);
         case Format::kEuroc:
             need_files(2, "is the sensor.yaml of one camera, expected two files: cam0's,cam1's");

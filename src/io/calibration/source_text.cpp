@@ -41,6 +41,11 @@ SourceText load_text(const std::filesystem::path& path) {
     if (!file || file.bad())
         throw Refusal(ExitStatus::kInput,
                       fmt::format("{}: cannot be read; check its permissions", path.string()));
+    const auto is_control = [](char c) {
+        return static_cast<unsigned char>(c) < ' ' && c != '\t' && c != '\r' && c != '\n';
+    };
+    if (std::any_of(source.text.begin(), source.text.end(), is_control))
+        refuse(path, 0, "not a text file, expected a calibration");
     if (trimmed(source.text).empty()) refuse(path, 0, "the file is empty, expected a calibration");
     return source;
 }
