@@ -1,0 +1,38 @@
+// `groundline evaluate`: how good a result is, as a table for people or as JSON for programs.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace CLI {
+class App;
+}
+
+namespace groundline::cli {
+
+struct EvaluateOptions {
+    std::filesystem::path truth;  // one result against its truth ...
+    std::filesystem::path out;
+    std::filesystem::path suite;  // ... or, where not empty, every folder with truth in this one
+    bool json = false;
+    // For a suite: the configuration of its replays.
+    std::filesystem::path config;
+    std::vector<std::string> set;
+    // For a suite: runs the pairs of `source` into the new folder `out` and returns the exit status; may
+    // throw Refusal.
+    std::function<int(const std::filesystem::path& source, const std::filesystem::path& out)> replay;
+};
+
+// Declares the options of the subcommand and takes run_replay() for a suite. `options` must outlive `app`.
+// Parsing throws CLI::ParseError for anything but TRUTH OUT or --suite DIR.
+void add_evaluate_options(CLI::App& app, EvaluateOptions& options);
+
+// Prints to stdout; what is missing is also said on stderr. Returns 0; 66 where a frame could not be read; in
+// a suite the first status that was not 0 (the other sets are still run), and 130 at once when a replay was
+// interrupted. Throws Refusal as evaluate_set() does, and kInput for a suite without any truth. The results
+// of a suite live below the system's temporary folder and are removed.
+int run_evaluate(const EvaluateOptions& options);
+
+}  // namespace groundline::cli
