@@ -1,0 +1,149 @@
+// What health says about frames that come, slow down and stay away.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "publish/health.hpp"
+#include "unit/publish_fixture.hpp"
+
+namespace groundline::publish {
+namespace {
+
+using test::Frame;
+
+constexpr std::int64_t kMs = 1'000'000;
+constexpr std::int64_t kStaleAfter = 500 * kMs;
+
+Reasons no_frames() {
+    Reasons reasons;
+    reasons.add(Reason::kNoFrames);
+    return reasons;
+}
+
+TEST(Health, StartingBeforeTheFirstResult) {
+    HealthTracker tracker(nullptr, kStaleAfter);
+    const HealthReport report = tracker.report(5, 1000 * kMs);
+    EXPECT_EQ(report.utime_us, 5);
+    EXPECT_EQ(report.state, LifeState::kStarting);
+    EXPECT_EQ(report.verdict, Verdict::kBlind);
+    EXPECT_EQ(report.reasons, no_frames());
+    EXPECT_EQ(report.sequence, -1);
+    EXPECT_TRUE(std::isnan(report.result_age_s));
+    EXPECT_TRUE(std::isnan(report.source_rate_hz));
+    EXPECT_EQ(report.counts.front(), -1);
+    EXPECT_TRUE(tracker.silent(1000 * kMs));
+}
+
+TEST(Health, RunningStalledRunningStopping) {
+    const Frame frame(8, 4);
+    HealthTracker tracker(nullptr, kStaleAfter);
+    tracker.note(frame.result, 2 * kMs, 1000 * kMs);
+    HealthReport report = tracker.report(0, 1500 * kMs);  // exactly kStaleAfter old: still running
+    EXPECT_EQ(report.state, LifeState::kRunning);
+    EXPECT_EQ(report.verdict, Verdict::kTrusted);
+    EXPECT_EQ(report.reasons, frame.result.reasons);
+    EXPECT_EQ(report.sequence, 41);
+    EXPECT_EQ(report.exposure_mono_ns, frame.result.stamp.exposure_mono_ns);
+    EXPECT_DOUBLE_EQ(report.result_age_s, 0.5);
+    EXPECT_DOUBLE_EQ(report.pair_skew_ms, 0.25);
+    EXPECT_DOUBLE_EQ(report.brightness_gain, 1.03);
+    EXPECT_DOUBLE_EQ(report.brightness_offset, -1.5);
+
+    report = tracker.report(0, 1500 * kMs + 1);
+    EXPECT_EQ(report.state, LifeState::kStalled);
+    EXPECT_EQ(report.verdict, Verdict::kBlind) << "a verdict of long ago must not stand";
+    EXPECT_EQ(report.reasons, no_frames());
+    EXPECT_EQ(report.sequence, 41);
+
+    tracker.note(frame.result, 2 * kMs, 2000 * kMs);
+    EXPECT_EQ(tracker.report(0, 2001 * kMs).state, LifeState::kRunning);
+    EXPECT_EQ(tracker.report(0, 2001 * kMs).verdict, Verdict::kTrusted);
+    tracker.stop();
+    EXPECT_EQ(tracker.report(0, 2001 * kMs).state, LifeState::kStopping);
+}
+
+TEST(Health, RatesAreOverTheLastFullSecond) {
+    const Frame frame(8, 4);
+    Counters counters;
+    HealthTracker tracker(&counters, kStaleAfter);
+    std::int64_t now = 0;
+    HealthReport report = tracker.report(0, now);
+    // 20 results a second, 30 pairs a second, 25 processed, reported every 100 ms.
+    for (int tick = 1; tick <= 20; ++tick) {
+        now = tick * 100 * kMs;
+        counters.add(Count::kFramesRead, 3);
+        if (tick % 2 == 0) counters.add(Count::kFramesProcessed, 5);
+        tracker.note(frame.result, kMs, now);
+        tracker.note(frame.result, kMs, now);
+        report = tracker.report(0, now);
+        if (tick < 10) {
+            EXPECT_TRUE(std::isnan(report.publish_rate_hz)) << "no full second yet";
+        }
+    }
+    EXPECT_DOUBLE_EQ(report.source_rate_hz, 30.0);
+    EXPECT_DOUBLE_EQ(report.process_rate_hz, 25.0);
+    EXPECT_DOUBLE_EQ(report.publish_rate_hz, 20.0);
+    EXPECT_EQ(report.counts.at(static_cast<std::size_t>(Count::kFramesRead)), 60);
+    EXPECT_EQ(report.counts.at(static_cast<std::size_t>(Count::kFramesBad)), 0);
+    report = tracker.report(0, now + 1000 * kMs);
+    EXPECT_DOUBLE_EQ(report.publish_rate_hz, 0.0) << "a second without results";
+}
+
+TEST(Health, RatesOfCountersThatNobodyKeepsAreNotMeasured) {
+    HealthTracker tracker(nullptr, kStaleAfter);
+    tracker.report(0, 0);
+    const HealthReport report = tracker.report(0, 2000 * kMs);
+    EXPECT_TRUE(std::isnan(report.source_rate_hz));
+    EXPECT_TRUE(std::isnan(report.process_rate_hz));
+    EXPECT_DOUBLE_EQ(report.publish_rate_hz, 0.0);
+}
+
+TEST(Health, LatenciesPerStage) {
+    Frame frame(8, 4);
+    frame.result.stamp.exposure_mono_ns = 1000 * kMs;
+    HealthTracker tracker(nullptr, kStaleAfter);
+    tracker.note(frame.result, 6 * kMs, 1050 * kMs);
+    const HealthReport report = tracker.report(0, 1050 * kMs);
+    for (const std::size_t stage : {0U, 1U, 2U, 3U, 4U})
+        EXPECT_DOUBLE_EQ(report.stages.at(stage).max_ms, 1.0 + static_cast<double>(stage));
+    EXPECT_TRUE(std::isnan(report.stages.at(static_cast<std::size_t>(Stage::kWrite)).p50_ms))
+        << "nobody wrote";
+    EXPECT_DOUBLE_EQ(report.stages.at(static_cast<std::size_t>(Stage::kPublish)).p50_ms, 6.0);
+    EXPECT_DOUBLE_EQ(report.exposure_to_publish.p99_ms, 50.0);
+}
+
+TEST(Health, FilesHaveNoLatencyFromExposure) {
+    Frame frame(8, 4);
+    for (const StampSource source : {StampSource::kFile, StampSource::kUnknown}) {
+        frame.result.stamp.source = source;
+        HealthTracker tracker(nullptr, kStaleAfter);
+        tracker.note(frame.result, kMs, 1050 * kMs);
+        EXPECT_TRUE(std::isnan(tracker.report(0, 1050 * kMs).exposure_to_publish.max_ms));
+    }
+}
+
+TEST(Health, SummaryOfAHistogram) {
+    LatencyHistogram histogram;
+    EXPECT_TRUE(std::isnan(summary_of(histogram).p50_ms) && std::isnan(summary_of(histogram).max_ms));
+    for (int i = 1; i <= 100; ++i)
+        histogram.add(i * kMs);
+    const LatencySummary summary = summary_of(histogram);
+    EXPECT_NEAR(summary.p50_ms, 50.0, 50.0 / 16);
+    EXPECT_NEAR(summary.p99_ms, 99.0, 99.0 / 16);
+    EXPECT_DOUBLE_EQ(summary.max_ms, 100.0);
+}
+
+TEST(Health, OthersMeasurementsPassThrough) {
+    const Frame frame(8, 4);
+    HealthTracker tracker(nullptr, kStaleAfter);
+    tracker.add({.temperature_c = 61.0, .throttled = 1, .memory_locked = 0});
+    tracker.note(frame.result, kMs, 0);
+    const HealthReport report = tracker.report(0, 0);
+    EXPECT_DOUBLE_EQ(report.host.temperature_c, 61.0);
+    EXPECT_EQ(report.host.throttled, 1);
+    EXPECT_EQ(report.host.memory_locked, 0);
+    EXPECT_EQ(report.host.realtime_scheduling, -1);
+}
+
+}  // namespace
+}  // namespace groundline::publish
