@@ -68,7 +68,6 @@ std::optional<DisparityPlane> through(const Point& a, const Point& b, const Poin
 }
 
 bool possible(const DisparityPlane& plane, const RectifiedRig& rig) {
-    if (!(plane.dv > 0.0)) return false;
     const GroundPose pose = pose_of(plane, rig);
     return pose.height_m >= 0.2 && pose.height_m <= 2.5 && pose.pitch_rad >= det::radians(-5.0) &&
            pose.pitch_rad <= det::radians(40.0) && std::abs(pose.roll_rad) <= det::radians(12.0);

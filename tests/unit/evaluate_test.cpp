@@ -223,6 +223,17 @@ TEST_F(Evaluate, RefusesWhatIsMalformed) {
     EXPECT_NE(sentence_.find("calib.txt"), std::string::npos) << sentence_;
 }
 
+TEST_F(Evaluate, BeyondThirtyMetresNothingIsJudged) {
+    make_truth(root_ / "truth");  // with this rig the ground is 45 m away, the obstacle 9 m
+    write(root_ / "truth/calib.txt", "P0: 100 0 4 0 0 100 1 0 0 0 1 0\nP1: 100 0 4 -90 0 100 1 0 0 0 1 0\n");
+    make_result(root_ / "out");
+    ASSERT_EQ(run_pair(), 0) << sentence_;
+    const json found = json::parse(out_);
+    EXPECT_EQ(found["terrain"]["obstacle_pixels"], 8);
+    EXPECT_EQ(found["terrain"]["ground_pixels"], 0);
+    EXPECT_TRUE(found["terrain"]["ground_known"].is_null());
+}
+
 TEST_F(Evaluate, WithoutClassesAndCalibrationOnlyDisparityIsJudged) {
     make_truth(root_ / "truth", false);
     fs::remove(root_ / "truth/truth.json");

@@ -104,6 +104,17 @@ TEST(Occlusion, ASlantedSurfaceDoesNotHideItself) {
     }
 }
 
+// Columns 8 .. 14 lean away: neighbours land 1.3 px apart in the right image and hide what lies between, too.
+TEST(Occlusion, ALeaningSurfaceHidesWithoutGaps) {
+    Disparities truth(18, 1, 256);
+    for (int x = 8; x < 15; ++x)
+        truth.at(x, 0) = stored(6.0 - 0.3 * (x - 8));
+    Bytes occluded(18, 1);
+    mark_occluded(truth.view(), occluded.view());
+    for (int x = 0; x < 18; ++x)
+        EXPECT_EQ(occluded.at(x, 0), x == 0 || (x >= 3 && x <= 7) ? 255 : 0) << x;
+}
+
 TEST(Labels, FromClassesAndHeights) {
     //                 sky,   ground, kerb,  box,   foot,  ditch, edge of it, an id of no meaning
     Bytes classes{0, 1, 1, 2, 2, 3, 3, 7};
@@ -267,6 +278,11 @@ TEST(FitGround, FindsNoneWhereThereIsNone) {
     for (std::uint16_t& pixel : noise.pixels)
         pixel = static_cast<std::uint16_t>(1 + random() % (60 * 256));
     EXPECT_FALSE(fit_ground(noise.view(), rig));
+    // A tenth of what is seen lies on a plane, the rest is clutter above it.
+    Disparities clutter = scene(pose_deg(6.0, 0.0, 1.0), rig, [&](int, int, double ground) {
+        return ground + (random() % 10 == 0 ? 0.0 : 4.0 + static_cast<double>(random() % 40));
+    });
+    EXPECT_FALSE(fit_ground(clutter.view(), rig));
 }
 
 }  // namespace
