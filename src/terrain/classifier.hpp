@@ -62,6 +62,7 @@ class Classifier {
     int disparities_;
     std::span<std::int32_t> certified_q4_;  // per column, the least measured disparity within its range
     Components components_;
+    FixedVector<Thing, kMaxObstacles> things_;
 };
 
 // Share of the mask's pixels in each class.

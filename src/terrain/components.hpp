@@ -1,55 +1,89 @@
 // Connected things among the obstacle and drop pixels of a mask, in fixed memory and bounded time.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 
 #include "core/arena.hpp"
 #include "core/disparity.hpp"
 #include "core/fixed_vector.hpp"
-#include "core/image.hpp"
+#include "core/ground.hpp"
 #include "core/result.hpp"
 #include "core/terrain_class.hpp"
 
 namespace groundline::terrain {
 
-// What the filter needs to know of the frame. Disparities are in 1/16 px, measured.
+// What the filter needs to know of the frame.
 struct ThingRules {
-    double offset_px = 0.0;    // measured minus true disparity
-    double px_per_unit = 1.0;  // image px per metre, or per camera height, at 1 px of true disparity: 1/b
-    double min_area = 0.003;   // in those units squared
+    DisparityPlane ground;    // of true disparity
+    double offset_px = 0.0;   // measured minus true disparity
+    double unit_px = 1.0;     // a pixel at true disparity d is unit_px / d wide: the baseline in metres
+    double min_area = 0.003;  // sum over a thing's pixels of (unit_px / d)^2, at least
+    double clearance = 0.0;   // H/h of the clearance; 0 where there is none
     int min_pixels = 12;
-    int range_edge_q4 = 0;  // what a range-edge pixel counts as
-    // H <= clearance  <=>  clearance_factor d <= d_g with d_g = du u + dv v + d0, all true disparities.
-    bool has_clearance = false;
-    double clearance_factor = 0.0;
-    DisparityPlane plane;  // true disparity
+    int range_edge_q4 = 0;  // what a range-edge pixel counts as, measured
 };
 
-// Used by one thread.
+struct Thing {
+    TerrainClass kind = TerrainClass::kObstacle;
+    bool overhang = false;
+    std::int32_t left = 0, top = 0, right = 0, bottom = 0;
+    std::int32_t pixels = 0;
+    double median_px = 0.0;   // measured disparity
+    double near_px = 0.0;     // true disparity that the nearest tenth of its pixels reach
+    double ratio_high = 0.0;  // H/h of its highest and its lowest pixel
+    double ratio_low = 0.0;
+};
+
+// Used by one thread. Time is near-linear in the pixels for any mask; memory is 12 bytes a pixel and some.
 class Components {
   public:
-    void take(Arena& arena, int width, int height, int min_disparity, int disparities);
+    // min_pixels is the least that ThingRules will ever name.
+    void take(Arena& arena, int width, int height, int min_disparity, int disparities, int min_pixels);
 
-    // Labels the pixels of class 2 and 3, 8-connected within a class where |delta d| <= 1 + 0.02 d, takes
-    // what is too small or wholly above the clearance out of the mask (class 0), and lists the rest, nearest
-    // first, and the overhangs; what exceeds kMaxObstacles stays in the mask unlisted, the farthest first.
-    // Fills pixels, box, disparity (median), and disparity_px_near, heights left to the caller as below.
-    struct Thing {
-        TerrainClass kind = TerrainClass::kObstacle;
-        bool overhang = false;
-        std::int32_t left = 0, top = 0, right = 0, bottom = 0;
-        std::int32_t pixels = 0;
-        double median_px = 0.0;   // measured disparity
-        double near_px = 0.0;     // true disparity of the nearest tenth
-        double ratio_high = 0.0;  // H/h of the highest and the lowest pixel
-        double ratio_low = 0.0;
-    };
+    // Labels the pixels of class 2 and of class 3, 8-connected where |delta d| <= 1 + 0.02 d. What is too
+    // small or wholly above the clearance becomes class 0. Lists what stays and the overhangs, nearest
+    // first, overhangs last; beyond kMaxObstacles the farthest stay in the mask unlisted. Each rule is
+    // monotone: adding pixels to a thing never makes it vanish.
     void find(ConstDisparityMap map, const ThingRules& rules, Mask mask,
               FixedVector<Thing, kMaxObstacles>& things);
 
   private:
-    struct Stats;
+    struct Run {
+        std::int32_t parent;
+        std::int32_t pixels;  // of the whole thing, at its root; after numbering, the thing's number or -1
+    };
+    struct Stats {
+        double area;
+        std::int64_t sum_q4;
+        std::int32_t left, top, right, bottom, pixels, listed;
+        TerrainClass kind;
+        bool low;  // reaches below the clearance
+    };
+    static constexpr std::int32_t kNone = -1;
+    static constexpr int kBinsPerPx = 4;
+
+    std::int32_t root_of(std::int32_t run);
+    void join(std::int32_t a, std::int32_t b);
+    int label(ConstDisparityMap map, int range_edge_q4, ConstMask mask);
+    void measure(ConstDisparityMap map, const ThingRules& rules, ConstMask mask);
+    void choose(const ThingRules& rules);
+    void list(ConstDisparityMap map, const ThingRules& rules, Mask mask,
+              FixedVector<Thing, kMaxObstacles>& things);
+    // Index into the tables by disparity.
+    std::size_t index_of(int measured_q4) const;
+
+    int first_q4_ = 0;
+    ImageView<std::int32_t> labels_;
+    std::span<Run> runs_;
+    std::span<Stats> stats_;
+    int thing_count_ = 0;
+    std::span<std::int32_t> chosen_;  // numbers of the things to list
+    int chosen_count_ = 0;
+    std::span<double> inverse_px_;  // 1 / true disparity, by measured disparity in 1/16 px
+    std::span<std::uint32_t> histograms_;
+    int bins_ = 0;
 };
 
 }  // namespace groundline::terrain

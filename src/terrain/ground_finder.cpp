@@ -12,6 +12,8 @@ namespace groundline::terrain {
 namespace {
 
 constexpr int kUnitsPerPixel = 16;
+constexpr int kShearedBinsPerPx = 2;  // enough to choose among lines; the plane is fitted to pixels
+constexpr int kStepsPerBin = kDisparityOne / kShearedBinsPerPx;
 constexpr double kRollStepDeg = 4.0;  // half of it blurs a row by 3 px at the edge of a VGA picture
 constexpr double kNearPx = 1.0;
 constexpr double kInlierPx = 1.5;
@@ -55,19 +57,23 @@ GroundFinder::GroundFinder(const TerrainConfig& config, const RectifiedRig& rig,
         det::tan(det::radians(std::fabs(gate.roll_deg) + gate.roll_max_deg)) * 0.5 * rig.width;
     pad_rows_ = static_cast<int>(steepest / row_step_) + 2;
     const int rows = (rig.height + row_step_ - 1) / row_step_ + 2 * pad_rows_;
-    const int bins = disparities * 4 + 1;
-    for (std::size_t i = 0; i < kMaxRolls; ++i) {
-        hough_[i].take(arena);
-        sheared_[i] = {arena.image<std::uint16_t>(bins, rows), -1.0 * pad_rows_ * row_step_, 1.0 * row_step_,
-                       min_disparity - offset_px_, 4.0};
-        shifts_[i] = arena.take<std::int32_t>(static_cast<std::size_t>(rig.width));
-    }
+    const int bins = disparities * kShearedBinsPerPx + 1;
     line_gate_.slope_min = arena.take<double>(Hough::kMaxHorizons);
     line_gate_.slope_max = arena.take<double>(Hough::kMaxHorizons);
+    set_line_gate(config.gate);
+    // From the highest horizon of any gate to the last row of a histogram.
+    const int max_distance =
+        rows + static_cast<int>(std::max(0.0, -line_gate_.horizon_first) / row_step_) + 2;
+    for (std::size_t i = 0; i < kMaxRolls; ++i) {
+        hough_[i].take(arena, max_distance);
+        sheared_[i] = {arena.image<std::uint16_t>(bins, rows), -1.0 * pad_rows_ * row_step_, 1.0 * row_step_,
+                       min_disparity - offset_px_, 1.0 * kShearedBinsPerPx};
+        shifts_[i] = arena.take<std::int32_t>(static_cast<std::size_t>(rig.width));
+    }
     plane_fit_.take(arena, rig.width, rig.height);
     tally_ = arena.take<RowTally>(static_cast<std::size_t>(rig.height));
     supported_rows_ = arena.take<std::uint8_t>(static_cast<std::size_t>(rig.height));
-    column_mass_ = arena.take<std::uint32_t>(static_cast<std::size_t>(bins));
+    column_mass_ = arena.take<std::uint32_t>(static_cast<std::size_t>(disparities) * 4 + 1);
 }
 
 Gate GroundFinder::gate_for(const GroundPose* prior) const {
@@ -99,13 +105,16 @@ void GroundFinder::set_line_gate(const Gate& gate) {
     }
     // A ground seen on less than a sixteenth of the rows is none.
     lowest = std::min(lowest, bottom - rig_.height / 16.0);
-    highest = std::min(highest, lowest - 2.0);
+    highest = std::min(highest, lowest - 2.0 * row_step_);
+    // Horizons lie on the rows of the histograms, so that row distances come from a table.
     LineGate& lines = line_gate_;
     lines.bottom_row = bottom;
+    highest = row_step_ * std::floor(highest / row_step_);
+    const int steps = static_cast<int>((lowest - highest) / row_step_) + 1;
+    lines.rows_per_step = (steps + Hough::kMaxHorizons - 1) / Hough::kMaxHorizons;
     lines.horizon_first = highest;
-    lines.horizon_step = std::max(2.0, (lowest - highest) / (Hough::kMaxHorizons - 1));
-    lines.count =
-        std::min(Hough::kMaxHorizons, static_cast<int>((lowest - highest) / lines.horizon_step) + 1);
+    lines.horizon_step = 1.0 * row_step_ * lines.rows_per_step;
+    lines.count = steps / lines.rows_per_step;
     for (int j = 0; j < lines.count; ++j) {
         const auto at = static_cast<std::size_t>(j);
         if (!rig_.calibrated) {
@@ -124,6 +133,7 @@ void GroundFinder::set_line_gate(const Gate& gate) {
 void GroundFinder::shear(ConstDisparityMap map, double tan_roll, RowHistogram& histogram,
                          std::span<std::int32_t> shifts) const {
     const int bins = histogram.cells.width;
+    const int end = (bins - 1) * kStepsPerBin;
     const int last_row = histogram.cells.height - 1;
     const int first_q4 =
         static_cast<int>(std::floor((histogram.first_px + offset_px_) * kDisparityOne + 0.5));
@@ -139,11 +149,11 @@ void GroundFinder::shear(ConstDisparityMap map, double tan_roll, RowHistogram& h
         for (int u = 0; u < map.width(); u += column_step_) {
             if (invalid[u] != Invalid::kNone) continue;
             const int above = disparity[u] - first_q4;
-            const int bin = above >> 2;
-            if (above < 0 || bin + 1 >= bins) continue;
+            if (above < 0 || above >= end) continue;
+            const int bin = above / kStepsPerBin;
             const int target = std::clamp(row + shifts[static_cast<std::size_t>(u)], 0, last_row);
             std::uint16_t* cells = histogram.cells.row(target) + bin;
-            const int upper = (above & 3) * (kUnitsPerPixel / 4);
+            const int upper = above % kStepsPerBin * (kUnitsPerPixel / kStepsPerBin);
             cells[0] = static_cast<std::uint16_t>(cells[0] + kUnitsPerPixel - upper);
             cells[1] = static_cast<std::uint16_t>(cells[1] + upper);
         }

@@ -10,8 +10,8 @@ namespace groundline::terrain {
 namespace {
 
 constexpr int kUnitsPerPixel = 16;
-constexpr double kLeastRowsBelow = 6.0;  // nearer to the horizon a cell's half bin swings the line by 10 %
-constexpr int kCandidates = 32;          // peaks the longest segment is sought among
+constexpr int kLeastRowsBelow = 3;  // histogram rows; nearer to the horizon half a bin swings a line by 10 %
+constexpr int kCandidates = 32;     // peaks the longest segment is sought among
 
 // Two lines are the same ground seen twice when they differ by little both at the bottom and half-way to the
 // horizon: a peak's own slopes in the accumulator must not count as a rival.
@@ -41,10 +41,10 @@ int mass_near(const RowHistogram& histogram, const std::uint16_t* cells, double 
 
 }  // namespace
 
-void Hough::take(Arena& arena) {
+void Hough::take(Arena& arena, int max_rows) {
     votes_ = arena.take<std::uint32_t>(static_cast<std::size_t>(kMaxHorizons) * kMaxBottoms);
     smoothed_ = arena.take<std::uint32_t>(votes_.size());
-    inverse_ = arena.take<double>(static_cast<std::size_t>(kMaxHorizons));
+    inverse_ = arena.take<double>(static_cast<std::size_t>(max_rows));
 }
 
 Line Hough::line_of(const LineGate& gate, int horizon, int bottom) const {
@@ -52,56 +52,71 @@ Line Hough::line_of(const LineGate& gate, int horizon, int bottom) const {
     return {row, bottom * bottom_step_ / (gate.bottom_row - row)};
 }
 
+// The heaviest local maxima (mass of three bins, at least 4 pixels) of one row, heaviest first.
+int Hough::strongest(const std::uint16_t* cells, int first_bin, int bins, Peaks& peaks) {
+    constexpr int kLeast = 4 * kUnitsPerPixel;
+    int count = 0;
+    int before = 0;
+    int mass = first_bin + 1 < bins ? cells[first_bin - 1] + cells[first_bin] + cells[first_bin + 1] : 0;
+    for (int k = first_bin; k + 1 < bins; ++k) {
+        const int after = k + 2 < bins ? cells[k] + cells[k + 1] + cells[k + 2] : 0;
+        if (mass >= kLeast && mass > before && mass >= after) {
+            int at = count;
+            while (at > 0 && peaks[static_cast<std::size_t>(at - 1)].mass < mass)
+                --at;
+            if (at < kPeaksPerRow) {
+                count = std::min(count + 1, kPeaksPerRow);
+                for (int i = count - 1; i > at; --i)
+                    peaks[static_cast<std::size_t>(i)] = peaks[static_cast<std::size_t>(i - 1)];
+                peaks[static_cast<std::size_t>(at)] = {mass, k};
+            }
+        }
+        before = mass;
+        mass = after;
+    }
+    return count;
+}
+
 void Hough::vote(const RowHistogram& histogram, const LineGate& gate, int cap) {
     const int bins = histogram.cells.width;
     // Lines need at least one true pixel of disparity: farther is beyond any use and full of mismatches.
     const int first_bin =
         std::max(1, static_cast<int>(std::ceil((1.0 - histogram.first_px) * histogram.bins_per_px)));
-    const int least = 4 * kUnitsPerPixel;
+    double slope_least = std::numeric_limits<double>::max();
+    double slope_most = 0.0;
+    for (int j = 0; j < gate.count; ++j) {
+        slope_least = std::min(slope_least, gate.slope_min[static_cast<std::size_t>(j)]);
+        slope_most = std::max(slope_most, gate.slope_max[static_cast<std::size_t>(j)]);
+    }
+    for (std::size_t k = 1; k < inverse_.size(); ++k)
+        inverse_[k] = 1.0 / (static_cast<double>(k) * histogram.row_step);
+    const int to_first =
+        static_cast<int>(std::floor((histogram.first_row - gate.horizon_first) / histogram.row_step + 0.5));
+    const double per_bottom = 1.0 / bottom_step_;
     for (int i = 0; i < histogram.cells.height; ++i) {
-        const std::uint16_t* cells = histogram.cells.row(i);
-        const double row = histogram.row_of(i);
-        struct Peak {
-            int mass;
-            int bin;
-        };
-        std::array<Peak, kPeaksPerRow> peaks{};
-        int count = 0;
-        int before = 0;
-        int mass = first_bin + 1 < bins ? cells[first_bin - 1] + cells[first_bin] + cells[first_bin + 1] : 0;
-        for (int k = first_bin; k + 1 < bins; ++k) {
-            const int after = k + 2 < bins ? cells[k] + cells[k + 1] + cells[k + 2] : 0;
-            if (mass >= least && mass > before && mass >= after) {
-                int at = count < kPeaksPerRow ? count++ : kPeaksPerRow - 1;
-                if (at == kPeaksPerRow - 1 && peaks[static_cast<std::size_t>(at)].mass >= mass) at = -1;
-                if (at >= 0) {
-                    for (; at > 0 && peaks[static_cast<std::size_t>(at - 1)].mass < mass; --at)
-                        peaks[static_cast<std::size_t>(at)] = peaks[static_cast<std::size_t>(at - 1)];
-                    peaks[static_cast<std::size_t>(at)] = {mass, k};
-                }
-            }
-            before = mass;
-            mass = after;
-        }
-        // Horizons high enough above this row; the nearest to the row come last.
-        int last =
-            static_cast<int>(std::floor((row - kLeastRowsBelow - gate.horizon_first) / gate.horizon_step));
-        if (row - kLeastRowsBelow < gate.horizon_first) continue;
-        last = std::min(last, gate.count - 1);
-        for (int j = 0; j <= last; ++j)
-            inverse_[static_cast<std::size_t>(j)] =
-                1.0 / (row - (gate.horizon_first + j * gate.horizon_step));
+        const int rows_down = i + to_first;  // below the highest horizon
+        const int last = std::min(gate.count - 1, (rows_down - kLeastRowsBelow) / gate.rows_per_step);
+        if (rows_down < kLeastRowsBelow) continue;
+        Peaks peaks;
+        const int count = strongest(histogram.cells.row(i), first_bin, bins, peaks);
         for (int p = 0; p < count; ++p) {
             const Peak& peak = peaks[static_cast<std::size_t>(p)];
             const double d_px = histogram.px_of(peak.bin);
             const auto weight = static_cast<std::uint32_t>(std::min(peak.mass, cap));
-            for (int j = last; j >= 0; --j) {
+            // Slopes in the gate put the horizon this many rows above.
+            const double fewest = d_px / slope_most / histogram.row_step;
+            const double most = d_px / slope_least / histogram.row_step;
+            const int lowest =
+                std::min(last, static_cast<int>(std::floor((rows_down - fewest) / gate.rows_per_step)) + 1);
+            const int highest =
+                std::max(0, static_cast<int>(std::floor((rows_down - most) / gate.rows_per_step)) - 1);
+            for (int j = highest; j <= lowest; ++j) {
                 const auto at = static_cast<std::size_t>(j);
-                const double slope = d_px * inverse_[at];
-                if (slope > gate.slope_max[at]) continue;
-                if (slope < gate.slope_min[at]) continue;
+                const double slope =
+                    d_px * inverse_[static_cast<std::size_t>(rows_down - j * gate.rows_per_step)];
+                if (slope > gate.slope_max[at] || slope < gate.slope_min[at]) continue;
                 const double horizon = gate.horizon_first + j * gate.horizon_step;
-                const double bottom = slope * (gate.bottom_row - horizon) / bottom_step_ + 0.5;
+                const double bottom = slope * (gate.bottom_row - horizon) * per_bottom + 0.5;
                 if (bottom >= bottoms_) continue;
                 votes_[at * kMaxBottoms + static_cast<std::size_t>(bottom)] += weight;
             }

@@ -31,10 +31,12 @@ struct Line {
     double at(double v) const { return slope * (v - horizon_row); }
 };
 
-// The lines that are possible: horizon rows horizon_first + j horizon_step and, for each, slopes.
+// The lines that are possible: horizon rows horizon_first + j horizon_step and, for each, slopes. Horizons
+// lie on rows of the histogram: a step is rows_per_step of them.
 struct LineGate {
     double horizon_first = 0.0;
     double horizon_step = 2.0;
+    int rows_per_step = 1;
     int count = 0;
     double bottom_row = 0.0;  // where lines are told apart
     std::span<double> slope_min;
@@ -57,7 +59,8 @@ class Hough {
     static constexpr int kMaxHorizons = 192;
     static constexpr int kMaxBottoms = 384;
 
-    void take(Arena& arena);
+    // For histograms of at most max_rows rows about a picture of that height.
+    void take(Arena& arena, int max_rows);
 
     // `cap` is the most one maximum votes, in units of the histogram, so that a wall's cell cannot outvote
     // many rows of ground. Lines whose disparity at the bottom row exceeds bottom_max_px are not considered.
@@ -72,13 +75,20 @@ class Hough {
         std::uint32_t votes = 0;
     };
 
+    struct Peak {
+        int mass;
+        int bin;
+    };
+    using Peaks = std::array<Peak, kPeaksPerRow>;
+
     void vote(const RowHistogram& histogram, const LineGate& gate, int cap);
+    static int strongest(const std::uint16_t* cells, int first_bin, int bins, Peaks& peaks);
     void smooth(int horizons);
     Line line_of(const LineGate& gate, int horizon, int bottom) const;
 
     std::span<std::uint32_t> votes_;     // [horizon][bottom], rows of kMaxBottoms
     std::span<std::uint32_t> smoothed_;  // sums of 3 x 3
-    std::span<double> inverse_;          // of the rows from each horizon to the voting row
+    std::span<double> inverse_;          // [k] 1 / (k row_step)
     int bottoms_ = 0;
     double bottom_step_ = 0.5;
 };

@@ -32,17 +32,29 @@ class SectorFinder {
               FixedVector<Sector, kMaxSectors>& sectors);
 
   private:
+    struct View;
+    int sector_of(double x, double y, int guess) const;
+    void count_things(ConstDisparityMap map, const View& view, ConstMask mask);
+    void count_ground(const View& view, ConstMask mask);
+    double nearest(std::span<const std::uint16_t> bins, double scale, double& width_m) const;
+
     TerrainConfig config_;
     RectifiedRig rig_;
     int last_disparity_;
     int count_;
+    int thing_bins_;
+    int ground_bins_;
     double first_bearing_rad_ = 0.0;  // left edge of the leftmost sector
     double width_rad_ = 0.0;
+    double cos_yaw_ = 1.0;
+    double sin_yaw_ = 0.0;
     std::span<double> edge_cos_;  // direction of each right edge
     std::span<double> edge_sin_;
-    std::span<std::uint16_t> things_;  // [class 2, 3][sector][inverse range bin]
-    std::span<std::uint32_t> ground_;  // [seen, expected][sector][inverse range bin]
-    std::span<std::uint32_t> known_;   // [known, all][sector]
+    std::span<std::uint16_t> things_;         // [class 2, 3][sector][inverse range bin]
+    std::span<std::uint32_t> ground_seen_;    // [sector][inverse range bin]
+    std::span<std::uint32_t> ground_likely_;  // the same, whatever the class
+    std::span<std::uint32_t> known_;          // [sector]
+    std::span<std::uint32_t> below_;          // [sector]
 };
 
 }  // namespace groundline::terrain
