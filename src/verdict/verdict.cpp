@@ -67,7 +67,8 @@ void judge_pictures(const Evidence& evidence, const Limits& limits, Reasons& rea
 }
 
 bool jumped(const Ground& own, const State& state, const Limits& limits) {
-    if (!own.metric || !state.ground.metric) return false;
+    if (!state.ground.metric) return false;
+    if (!own.metric) return true;  // where it went cannot be said
     const double step =
         det::radians(limits.max_attitude_step_deg) * static_cast<double>(state.frames_since + 1);
     return !magnitude_at_most(own.pose.pitch_rad - state.ground.pose.pitch_rad, step) ||
@@ -79,12 +80,12 @@ void judge_ground(const Evidence& evidence, const State& state, bool fresh, cons
     const GroundEvidence& fit = evidence.ground_fit;
     const Ground& own = evidence.ground;
     if (fit.wall) reasons.add(Reason::kWall);
+    if (!at_least(fit.density, limits.min_density)) reasons.add(Reason::kLowDensity);
     if (!fit.line_found) {
         reasons.add(Reason::kNoGround);
         return;  // the other measures are about a line
     }
     if (!fit.inside_gate) reasons.add(Reason::kOutsideGate);
-    if (!at_least(fit.density, limits.min_density)) reasons.add(Reason::kLowDensity);
     if (!at_least(fit.inlier_share, limits.min_inlier_share)) reasons.add(Reason::kFewInliers);
     if (!at_least(fit.line_run_share, limits.min_line_run_share)) reasons.add(Reason::kShortLine);
     if (!at_most(fit.second_peak_ratio, limits.max_second_peak_ratio)) reasons.add(Reason::kAmbiguous);

@@ -62,15 +62,18 @@ struct Decision {
 };
 
 // `now_mono_ns` is the exposure of the frame that `evidence` is about, so that a replay decides as the live
-// run did. Rules:
-// - Own ground is unusable with kNoGround, kWall, kOutsideGate, kPoseJump, kAmbiguous, kFewInliers or
-// kShortLine:
-//   it may not be ground at all. Then the remembered one stands in while it is no older than hold_ns
-//   (degraded, kHeldGround); else blind.
-// - Own ground is weak with any other reason but kNoMountPrior: degraded, on the frame's own ground.
-// - Otherwise trusted; a first frame may be.
+// run did. Three cases, the thresholds from Limits:
+//
+// - kNoGround, kWall, kOutsideGate, kPoseJump, kAmbiguous, kFewInliers, kShortLine: what was found may be no
+//   ground at all. The remembered one stands in while it is no older than hold_ns: degraded, with
+//   kHeldGround. Else blind.
+// - Any other reason but kNoMountPrior: it is the ground, but thin or seen badly: degraded, on the frame's
+// own.
+// - None of them: trusted; a first frame may be.
+//
 // kPoseJump compares with the remembered ground while that is fresh. A stamp before the remembered one means
 // that the source began again: the memory does not count. Worse evidence never gives a better verdict or use.
+// kFrozen, kSwapped, kEpipolar, kBlurred and kOverload are never given: Evidence does not hold them.
 Decision decide(const Evidence& evidence, const State& state, std::int64_t now_mono_ns, const Limits& limits);
 
 // The state after that decision. Remembered is a ground whose only reasons are kNoMountPrior and

@@ -1,0 +1,1 @@
+groundline_test(verdict SOURCES unit/verdict_test.cpp USES verdict core)
