@@ -224,7 +224,8 @@ void paint_v_disparity(const FrameResult& result, Image8& to) {
     if (to.bytes.empty()) return;
 
     // A column shows the sum over one pixel of disparity around it, so that whole-pixel disparities do not
-    // leave three of four columns empty. Full brightness is a third of a row in one pixel of disparity.
+    // leave three of four columns empty. Full brightness is a third of a row in one pixel of disparity;
+    // the square of the logarithm keeps single mismatches dim beside what many rows agree on.
     const unsigned full = log2_q8(static_cast<unsigned>(kDisparityOne * std::max(1, result.left.width / 3)));
     const int reach = merge == 1 ? v.bins_per_px / 2 : 0;
     for (int y = 0; y < to.height; ++y) {
@@ -237,7 +238,8 @@ void paint_v_disparity(const FrameResult& result, Image8& to) {
             unsigned sum = 0;
             for (int bin = first; bin < end; ++bin)
                 sum += row[bin];
-            const auto grey = static_cast<std::uint8_t>(std::min(255U, log2_q8(sum) * 255 / full));
+            const unsigned share_q8 = std::min(256U, log2_q8(sum) * 256 / full);
+            const auto grey = static_cast<std::uint8_t>((share_q8 * share_q8 * 255) >> 16U);
             pixel[0] = pixel[1] = pixel[2] = grey;
         }
     }
@@ -264,7 +266,7 @@ void paint_v_disparity(const FrameResult& result, Image8& to) {
         draw(1.0 / (1.0 + ratio), kToleranceColour, 1);
         if (ratio < 1.0) draw(1.0 / (1.0 - ratio), kToleranceColour, 1);
     }
-    draw(1.0, kGroundLineColour, 2);
+    draw(1.0, kGroundLineColour, 1);
 }
 
 }  // namespace groundline::io
