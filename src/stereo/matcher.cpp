@@ -24,10 +24,10 @@ void check(const MatcherConfig& config, int width, int height) {
                "; it must be a multiple of 16 from 16 to 256");
     const long first = config.min_disparity;
     const long last = first + config.disparities - 1;
-    if (std::max(std::labs(first), std::labs(last)) >= width)
+    if (std::max(std::labs(first), last + 1) >= width)
         refuse("disparities " + std::to_string(first) + " to " + std::to_string(last) +
                " px cannot be searched in images of " + size +
-               " px: each must be smaller than the width; lower the number of disparities");
+               " px: the range must be smaller than the width; lower the number of disparities");
     if (last > 2046 || first < -2046)
         refuse("disparities " + std::to_string(first) + " to " + std::to_string(last) +
                " px do not fit the result: they must stay within -2046 to 2046");
