@@ -14,7 +14,7 @@ namespace {
 constexpr int kUnitsPerPixel = 16;
 constexpr int kShearedBinsPerPx = 2;  // enough to choose among lines; the plane is fitted to pixels
 constexpr int kStepsPerBin = kDisparityOne / kShearedBinsPerPx;
-constexpr double kRollStepDeg = 4.0;  // half of it blurs a row by 3 px at the edge of a VGA picture
+constexpr double kRollStepDeg = 6.0;  // half of it blurs a row by 3 px at the edge of a VGA picture
 constexpr double kNearPx = 1.0;
 constexpr double kInlierPx = 1.5;
 constexpr double kResidualPx = 3.0;
@@ -190,7 +190,7 @@ bool GroundFinder::fit(ConstDisparityMap map, const Gate& gate, Parallel& parall
     parallel.for_each(rolls * kPeaks, [&](int index, int) {
         const auto i = static_cast<std::size_t>(index / kPeaks);
         const auto peak = static_cast<std::size_t>(index % kPeaks);
-        if (!found[i].found || found[i].votes[peak] <= 0.0) return;
+        if (index % kPeaks >= found[i].count) return;
         const Line line = refine_line(sheared_[i], found[i].lines[peak], cap);
         DisparityPlane start;
         start.du = line.slope * tangent[i];

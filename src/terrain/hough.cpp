@@ -11,7 +11,6 @@ namespace {
 
 constexpr int kUnitsPerPixel = 16;
 constexpr int kLeastRowsBelow = 3;  // histogram rows; nearer to the horizon half a bin swings a line by 10 %
-constexpr int kCandidates = 32;     // peaks the longest segment is sought among
 
 // Two lines are the same ground seen twice when they differ by little both at the bottom and half-way to the
 // horizon: a peak's own slopes in the accumulator must not count as a rival.
@@ -156,71 +155,66 @@ HoughResult Hough::find(const RowHistogram& histogram, const LineGate& gate, dou
     vote(histogram, gate, cap);
     smooth(gate.count);
 
-    const auto votes_at = [&](int j, int k) {
-        return smoothed_[static_cast<std::size_t>(j) * kMaxBottoms + static_cast<std::size_t>(k)];
-    };
-    Cell best;
-    for (int j = 0; j < gate.count; ++j)
-        for (int k = 1; k < bottoms_; ++k)
-            if (votes_at(j, k) > best.votes) best = {j, k, votes_at(j, k)};
-    if (best.votes == 0) return result;
-
+    // The heaviest local maxima, heaviest first.
+    std::array<Cell, kCandidates> candidates;
+    const int count = maxima(gate.count, candidates);
     if (mode == LineMode::kLongest) {
-        std::array<Cell, kCandidates> candidates{};
-        int count = 0;
-        for (int j = 0; j < gate.count; ++j) {
-            for (int k = 1; k < bottoms_; ++k) {
-                const std::uint32_t votes = votes_at(j, k);
-                if (votes * 4ULL < best.votes) continue;
-                bool peak = true;
-                for (int dj = -1; dj <= 1 && peak; ++dj)
-                    for (int dk = -1; dk <= 1 && peak; ++dk) {
-                        if (j + dj < 0 || j + dj >= gate.count || k + dk >= bottoms_) continue;
-                        const std::uint32_t other = votes_at(j + dj, k + dk);
-                        const bool earlier = dj < 0 || (dj == 0 && dk < 0);
-                        peak = earlier ? other < votes : other <= votes;
-                    }
-                if (!peak) continue;
-                int at = count < kCandidates ? count++ : kCandidates - 1;
-                if (at == kCandidates - 1 && candidates[static_cast<std::size_t>(at)].votes >= votes)
-                    continue;
-                for (; at > 0 && candidates[static_cast<std::size_t>(at - 1)].votes < votes; --at)
-                    candidates[static_cast<std::size_t>(at)] = candidates[static_cast<std::size_t>(at - 1)];
-                candidates[static_cast<std::size_t>(at)] = {j, k, votes};
-            }
-        }
         const double gap_rows = (gate.bottom_row + 1.0) / 40.0;
-        double longest = -1.0;
         for (int c = 0; c < count; ++c) {
-            const Cell& cell = candidates[static_cast<std::size_t>(c)];
-            const double length = longest_segment(histogram, line_of(gate, cell.horizon, cell.bottom),
-                                                  gap_rows, 4 * kUnitsPerPixel);
-            if (length > longest) {  // candidates come by votes, so votes decide between equals
-                longest = length;
-                best = cell;
-            }
+            Cell& cell = candidates[static_cast<std::size_t>(c)];
+            cell.length = longest_segment(histogram, line_of(gate, cell.horizon, cell.bottom), gap_rows,
+                                          4 * kUnitsPerPixel);
         }
+        // Stable: votes decide between equals.
+        for (int c = 1; c < count; ++c)
+            for (int i = c; i > 0 && candidates[static_cast<std::size_t>(i)].length >
+                                         candidates[static_cast<std::size_t>(i - 1)].length;
+                 --i)
+                std::swap(candidates[static_cast<std::size_t>(i)],
+                          candidates[static_cast<std::size_t>(i - 1)]);
     }
-
-    result.found = true;
-    result.lines[0] = line_of(gate, best.horizon, best.bottom);
-    result.votes[0] = best.votes;
-    std::uint32_t second = 0;
-    for (int j = 0; j < gate.count; ++j) {
-        for (int k = 1; k < bottoms_; ++k) {
-            if (votes_at(j, k) <= second) continue;
-            const Line line = line_of(gate, j, k);
-            if (nearly_same(result.lines[0], line, gate.bottom_row)) continue;
-            second = votes_at(j, k);
-            result.lines[1] = line;
-            result.votes[1] = second;
-        }
+    for (int c = 0; c < count && result.count < HoughResult::kPeaks; ++c) {
+        const Cell& cell = candidates[static_cast<std::size_t>(c)];
+        const Line line = line_of(gate, cell.horizon, cell.bottom);
+        bool known = false;
+        for (int i = 0; i < result.count && !known; ++i)
+            known = nearly_same(result.lines[static_cast<std::size_t>(i)], line, gate.bottom_row);
+        if (known) continue;
+        result.lines[static_cast<std::size_t>(result.count)] = line;
+        result.votes[static_cast<std::size_t>(result.count)] = cell.votes;
+        ++result.count;
     }
     return result;
 }
 
+int Hough::maxima(int horizons, std::array<Cell, kCandidates>& candidates) const {
+    int count = 0;
+    for (int j = 0; j < horizons; ++j) {
+        const std::uint32_t* here = &smoothed_[static_cast<std::size_t>(j) * kMaxBottoms];
+        for (int k = 1; k < bottoms_; ++k) {
+            const std::uint32_t votes = here[k];
+            const bool full = count == kCandidates;
+            if (votes == 0 || (full && votes <= candidates[kCandidates - 1].votes)) continue;
+            // Earlier neighbours win ties, so that a plateau counts once.
+            if (here[k - 1] >= votes || (k + 1 < bottoms_ && here[k + 1] > votes)) continue;
+            bool peak = true;
+            for (int dk = -1; dk <= 1 && peak; ++dk) {
+                if (k + dk >= bottoms_) continue;
+                if (j > 0) peak = here[k + dk - kMaxBottoms] < votes;
+                if (peak && j + 1 < horizons) peak = here[k + dk + kMaxBottoms] <= votes;
+            }
+            if (!peak) continue;
+            int at = full ? kCandidates - 1 : count++;
+            for (; at > 0 && candidates[static_cast<std::size_t>(at - 1)].votes < votes; --at)
+                candidates[static_cast<std::size_t>(at)] = candidates[static_cast<std::size_t>(at - 1)];
+            candidates[static_cast<std::size_t>(at)] = {j, k, votes, 0.0};
+        }
+    }
+    return count;
+}
+
 Line refine_line(const RowHistogram& histogram, const Line& start, int cap) {
-    constexpr std::array<double, 8> kTolerancesPx = {3.0, 3.0, 2.0, 2.0, 1.5, 1.5, 1.5, 1.5};
+    constexpr std::array<double, 5> kTolerancesPx = {3.0, 3.0, 2.0, 1.5, 1.5};
     Line line = start;
     const double middle_row = histogram.row_of(histogram.cells.height / 2);
     for (const double tolerance : kTolerancesPx) {

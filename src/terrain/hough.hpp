@@ -43,10 +43,10 @@ struct LineGate {
     std::span<double> slope_max;
 };
 
-// The best line and the best of those that are not nearly the same; votes 0 where there is none.
+// The best lines, best first, none nearly the same as another.
 struct HoughResult {
-    static constexpr int kPeaks = 2;
-    bool found = false;
+    static constexpr int kPeaks = 3;
+    int count = 0;
     std::array<Line, kPeaks> lines{};
     std::array<double, kPeaks> votes{};
 };
@@ -56,8 +56,8 @@ struct HoughResult {
 class Hough {
   public:
     static constexpr int kPeaksPerRow = 6;
-    static constexpr int kMaxHorizons = 192;
-    static constexpr int kMaxBottoms = 384;
+    static constexpr int kMaxHorizons = 96;
+    static constexpr int kMaxBottoms = 256;
 
     // For histograms of at most max_rows rows about a picture of that height.
     void take(Arena& arena, int max_rows);
@@ -69,10 +69,12 @@ class Hough {
                      LineMode mode);
 
   private:
+    static constexpr int kCandidates = 64;
     struct Cell {
-        int horizon = -1;
-        int bottom = 0;
-        std::uint32_t votes = 0;
+        int horizon;
+        int bottom;
+        std::uint32_t votes;
+        double length;  // of the supported segment, where asked for
     };
 
     struct Peak {
@@ -84,6 +86,7 @@ class Hough {
     void vote(const RowHistogram& histogram, const LineGate& gate, int cap);
     static int strongest(const std::uint16_t* cells, int first_bin, int bins, Peaks& peaks);
     void smooth(int horizons);
+    int maxima(int horizons, std::array<Cell, kCandidates>& candidates) const;
     Line line_of(const LineGate& gate, int horizon, int bottom) const;
 
     std::span<std::uint32_t> votes_;     // [horizon][bottom], rows of kMaxBottoms
