@@ -196,25 +196,42 @@ bool GroundFinder::fit(ConstDisparityMap map, const Gate& gate, Parallel& parall
         start.du = line.slope * tangent[i];
         start.dv = line.slope;
         start.d0 = -line.slope * (centre_u_ * tangent[i] + line.horizon_row) + offset_px_;
-        planes[static_cast<std::size_t>(index)] = plane_fit_.converge(start);
+        planes[static_cast<std::size_t>(index)] = plane_fit_.converge(start, 5.0);
     });
-    const PlaneFitResult* strongest = nullptr;
-    bool strongest_inside = false;
-    for (const PlaneFitResult& plane : planes) {
-        if (!plane.found) continue;
-        const bool plane_inside = inside(plane.plane, gate);
-        if (strongest == nullptr || (plane_inside && !strongest_inside) ||
-            (plane_inside == strongest_inside && plane.weight > strongest->weight)) {
-            strongest = &plane;
-            strongest_inside = plane_inside;
-        }
+    const auto better = [&](const PlaneFitResult& a, const PlaneFitResult& b) {
+        const bool a_inside = a.found && inside(a.plane, gate);
+        const bool b_inside = b.found && inside(b.plane, gate);
+        return a_inside != b_inside ? a_inside : a.found && (!b.found || a.weight > b.weight);
+    };
+    PlaneFitResult strongest;
+    for (const PlaneFitResult& plane : planes)
+        if (better(plane, strongest)) strongest = plane;
+    if (!strongest.found) return false;
+    // A verge or a pavement beside the road makes planes through both that a fit settles on: look about,
+    // a few degrees of roll and a few pixels away, for one that holds more.
+    constexpr std::array<std::array<double, 2>, 6> kAbout = {
+        {{0.03, 0.0}, {-0.03, 0.0}, {0.06, 0.0}, {-0.06, 0.0}, {0.0, 2.0}, {0.0, -2.0}}};
+    constexpr int kRounds = 2;
+    for (int round = 0; round < kRounds; ++round) {
+        std::array<PlaneFitResult, kAbout.size()> about{};
+        parallel.for_each(static_cast<int>(kAbout.size()), [&](int index, int) {
+            const auto i = static_cast<std::size_t>(index);
+            DisparityPlane start = strongest.plane;
+            const double du = kAbout[i][0] * start.dv;
+            start.du += du;
+            start.d0 += kAbout[i][1] - du * centre_u_;
+            about[i] = plane_fit_.converge(start, 3.0);
+        });
+        const PlaneFitResult before = strongest;
+        for (const PlaneFitResult& plane : about)
+            if (better(plane, strongest)) strongest = plane;
+        if (strongest.weight <= 1.01 * before.weight) break;
     }
-    if (strongest == nullptr) return false;
     second_ratio = 0.0;
     for (const PlaneFitResult& plane : planes)
-        if (plane.found && inside(plane.plane, gate) && !nearly_same(plane.plane, strongest->plane))
-            second_ratio = std::max(second_ratio, plane.weight / strongest->weight);
-    best = plane_fit_.fit(map, strongest->plane, parallel);
+        if (plane.found && inside(plane.plane, gate) && !nearly_same(plane.plane, strongest.plane))
+            second_ratio = std::max(second_ratio, plane.weight / strongest.weight);
+    best = plane_fit_.fit(map, strongest.plane, parallel);
     return best.found;
 }
 

@@ -91,11 +91,12 @@ bool PlaneFit::improve(const Moments& moments, DisparityPlane& plane) const {
     return true;
 }
 
-PlaneFitResult PlaneFit::converge(const DisparityPlane& start) const {
+PlaneFitResult PlaneFit::converge(const DisparityPlane& start, double first_tolerance_px) const {
     constexpr std::array<double, 11> kTolerancesPx = {5.0, 5.0, 4.0, 4.0, 3.0, 3.0, 2.0, 2.0, 1.5, 1.5, 1.5};
     PlaneFitResult result;
     DisparityPlane plane = start;
     for (const double tolerance : kTolerancesPx) {
+        if (tolerance > first_tolerance_px) continue;
         Moments sums;
         for (std::size_t i = 0; i < samples_used_; ++i) {
             const Sample& sample = samples_[i];

@@ -35,9 +35,9 @@ class PlaneFit {
 
     // Takes the thin sample of a frame; `offset_px` is measured minus true disparity. Call first.
     void sample(ConstDisparityMap map, double offset_px);
-    // found is false where too few pixels or a degenerate spread remain; no covariance. May be called from
-    // several lanes at once.
-    PlaneFitResult converge(const DisparityPlane& start) const;
+    // Leaves out the tolerances above first_tolerance_px. found is false where too few pixels or a degenerate
+    // spread remain; no covariance. May be called from several lanes at once.
+    PlaneFitResult converge(const DisparityPlane& start, double first_tolerance_px) const;
     // Sums are in a fixed order, whatever the lanes.
     PlaneFitResult fit(ConstDisparityMap map, const DisparityPlane& start, Parallel& parallel);
 
