@@ -4,7 +4,7 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 
-groundline=$(find "$1" -type f -name groundline -perm -u+x | head -n 1)
+groundline=$(find "$1" -type f -name groundline -perm -u+x -print -quit)
 [[ -n $groundline ]] || {
     echo "There is no program groundline under $1; build it first." >&2
     exit 1
