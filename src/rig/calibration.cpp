@@ -53,8 +53,8 @@ class Check {
     void baseline(double baseline_m) const {
         if (!std::isfinite(baseline_m)) refuse("the baseline is not a finite number");
         if (std::abs(baseline_m) < kLeastBaseline)
-            refuse(fmt::format("the baseline is {} m, expected at least {} m between the cameras", baseline_m,
-                               kLeastBaseline));
+            refuse(fmt::format("the baseline is {} m, expected at least {} m between the cameras",
+                               std::abs(baseline_m), kLeastBaseline));
         if (std::abs(baseline_m) > kMostBaseline)
             refuse(
                 fmt::format("the baseline is {:.4g} m, expected at most {} m; lengths must be in metres, so "

@@ -2,42 +2,64 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <boost/property_tree/ptree.hpp>
+#include <boost/property_tree/xml_parser.hpp>
 #include <cmath>
-#include <opencv2/core.hpp>
+#include <sstream>
 
 namespace groundline::io {
 namespace {
 
+namespace tree = boost::property_tree;
+
 constexpr int kDeepest = 32;  // no calibration nests deeper; bounds the recursion on hostile files
 
-YAML::Node converted(const cv::FileNode& from, int depth) {
-    YAML::Node to;
-    if (depth > kDeepest) return to;
-    if (from.isMap() || from.isSeq()) {
-        for (const cv::FileNode& child : from) {
-            if (from.isMap())
-                to[child.name()] = converted(child, depth + 1);
-            else
-                to.push_back(converted(child, depth + 1));
-        }
-    } else if (from.isInt()) {
-        to = fmt::format("{}", static_cast<int>(from));
-    } else if (from.isReal()) {
-        to = fmt::format("{}", static_cast<double>(from));
-    } else if (from.isString()) {
-        to = static_cast<std::string>(from);
+// Elements within elements, before a parser recurses into them.
+int xml_depth(const std::string& text) {
+    int depth = 0;
+    int deepest = 0;
+    for (std::size_t i = 0; i + 1 < text.size(); ++i) {
+        if (text[i] == '<' && text[i + 1] != '?' && text[i + 1] != '!') depth += text[i + 1] == '/' ? -1 : 1;
+        if (text[i] == '/' && text[i + 1] == '>') --depth;
+        deepest = std::max(deepest, depth);
     }
+    return deepest;
+}
+
+// OpenCV's way with XML: an element holds named elements, or elements named "_", or words between blanks.
+YAML::Node converted(const tree::ptree& from) {
+    YAML::Node to;
+    for (const auto& [name, child] : from) {
+        if (name == "<xmlattr>" || name == "<xmlcomment>") continue;
+        if (name == "_")
+            to.push_back(converted(child));
+        else
+            to[name] = converted(child);
+    }
+    if (to.IsDefined() && !to.IsNull()) return to;
+    std::istringstream words(from.data());
+    for (std::string word; words >> word;)
+        to.push_back(word);
+    if (to.size() == 1) return YAML::Clone(to[0]);
     return to;
 }
 
+// Not through cv::FileStorage: 4.6 reads beyond the end of a file that is cut within a tag.
 YAML::Node from_xml(const SourceText& source) {
+    if (xml_depth(source.text) > kDeepest) refuse(source.path, 0, "not OpenCV XML: elements nest too deep");
+    std::istringstream stream(source.text);
+    tree::ptree document;
     try {
-        const cv::FileStorage storage(
-            source.text, cv::FileStorage::READ | cv::FileStorage::MEMORY | cv::FileStorage::FORMAT_XML);
-        return converted(storage.root(), 0);
-    } catch (const cv::Exception& error) {
-        refuse(source.path, 0, fmt::format("not readable as OpenCV XML ({})", error.err));
+        tree::read_xml(stream, document);
+    } catch (const tree::xml_parser_error& error) {
+        refuse(source.path, static_cast<int>(error.line()),
+               fmt::format("not readable as XML ({})", error.message()));
     }
+    const auto storage = document.find("opencv_storage");
+    if (storage == document.not_found())
+        refuse(source.path, 0, "not OpenCV XML, expected an element opencv_storage");
+    return converted(storage->second);
 }
 
 YAML::Node from_yaml(const SourceText& source) {
