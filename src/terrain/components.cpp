@@ -222,8 +222,11 @@ void Components::list(ConstDisparityMap map, const ThingRules& rules, Mask mask,
         things[i].median_px = disparity_at((pixels + 1) / 2);
         things[i].near_px = disparity_at((pixels + 9) / 10) - rules.offset_px;
     }
-    std::stable_sort(things.begin(), things.end(), [](const Thing& a, const Thing& b) {
-        return a.overhang != b.overhang ? b.overhang : a.near_px > b.near_px;
+    // A total order, so that sorting needs no stability (std::stable_sort allocates).
+    std::sort(things.begin(), things.end(), [](const Thing& one, const Thing& other) {
+        if (one.overhang != other.overhang) return other.overhang;
+        if (one.near_px != other.near_px) return one.near_px > other.near_px;
+        return one.top != other.top ? one.top < other.top : one.left < other.left;
     });
 }
 
