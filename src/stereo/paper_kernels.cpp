@@ -91,6 +91,53 @@ GROUNDLINE_PART void rule_two_row(const Cost* __restrict above, const Cost* __re
     }
 }
 
+GROUNDLINE_PART void select_row(const Cost* __restrict costs, int index, int width, Cost* __restrict best,
+                                std::int16_t* __restrict best_index) {
+    const auto now = static_cast<std::int16_t>(index);
+    for (int x = 0; x < width; ++x) {
+        const Cost cost = costs[x];
+        const Cost old_best = best[x];
+        const std::int16_t old_index = best_index[x];
+        best[x] = cost < old_best ? cost : old_best;
+        best_index[x] = cost < old_best ? now : old_index;
+    }
+}
+
+GROUNDLINE_PART void select_row_with_evidence(const Cost* __restrict costs, const Cost* __restrict refined,
+                                              const Cost* __restrict refined_before, int index, int width,
+                                              Cost* __restrict best, std::int16_t* __restrict best_index,
+                                              Cost* __restrict before, Cost* __restrict second,
+                                              Cost* __restrict lower, Cost* __restrict centre,
+                                              Cost* __restrict upper) {
+    const auto now = static_cast<std::int16_t>(index);
+    const auto previous = static_cast<std::int16_t>(index - 1);
+    for (int x = 0; x < width; ++x) {
+        // Everything is read and written whatever wins: a loop without branches.
+        const Cost cost = costs[x];
+        const Cost old_best = best[x];
+        const Cost old_before = before[x];
+        const Cost old_second = second[x];
+        const Cost old_lower = lower[x];
+        const Cost old_centre = centre[x];
+        const Cost old_upper = upper[x];
+        const Cost here = refined[x];
+        const Cost there = refined_before[x];
+        const std::int16_t old_index = best_index[x];
+        const Cost wins = mask_if(cost < old_best);
+        // Against a new winner stands the lowest cost of all disparities but the last two; against the old
+        // one, this cost too once it is more than one disparity away.
+        const Cost rival = old_index < previous ? cost : kNoCost;
+        const Cost challenger = rival < old_second ? rival : old_second;
+        second[x] = pick(wins, old_before, challenger);
+        before[x] = old_best;
+        best[x] = pick(wins, cost, old_best);
+        best_index[x] = pick(wins, now, old_index);
+        lower[x] = pick(wins, there, old_lower);
+        centre[x] = pick(wins, here, old_centre);
+        upper[x] = pick(mask_if(old_index == previous), here, old_upper);
+    }
+}
+
 }  // namespace
 
 GROUNDLINE_KERNEL void truncated_differences(const std::uint8_t* __restrict left,
@@ -118,7 +165,6 @@ GROUNDLINE_KERNEL void weigh_down(const std::array<const std::uint8_t*, 2 * kWin
                        *r5 = rows[5], *r6 = rows[6], *r7 = rows[7], *r8 = rows[8], *r9 = rows[9],
                        *r10 = rows[10];
     const std::uint16_t g0 = taps[0], g1 = taps[1], g2 = taps[2], g3 = taps[3], g4 = taps[4], g5 = taps[5];
-#pragma GCC ivdep
     for (int x = 0; x < width; ++x) {
         const auto p1 = static_cast<std::uint8_t>(r4[x] + r6[x]);  // at most 2 * 28
         const auto p2 = static_cast<std::uint8_t>(r3[x] + r7[x]);
@@ -177,58 +223,15 @@ GROUNDLINE_KERNEL void rule_two(RuleTwo rule, bool sums, const Rows& looked_at, 
         rule_two_row<RuleTwo::kSevenOfNine, true>(above, here, below, costs, width, out);
 }
 
-GROUNDLINE_KERNEL void select(const Cost* __restrict costs, int index, int width, const Winners& winners) {
-    Cost* __restrict best = winners.best;
-    std::int16_t* __restrict best_index = winners.index;
-    const auto now = static_cast<std::int16_t>(index);
-#pragma GCC ivdep
-    for (int x = 0; x < width; ++x) {
-        const Cost cost = costs[x];
-        const Cost old_best = best[x];
-        const std::int16_t old_index = best_index[x];
-        best[x] = cost < old_best ? cost : old_best;
-        best_index[x] = cost < old_best ? now : old_index;
-    }
+GROUNDLINE_KERNEL void select(const Cost* costs, int index, int width, const Winners& winners) {
+    select_row(costs, index, width, winners.best, winners.index);
 }
 
-GROUNDLINE_KERNEL void select_with_evidence(const Cost* __restrict costs, const Cost* __restrict refined,
-                                            const Cost* __restrict refined_before, int index, int width,
+GROUNDLINE_KERNEL void select_with_evidence(const Cost* costs, const Cost* refined,
+                                            const Cost* refined_before, int index, int width,
                                             const Winners& winners) {
-    Cost* __restrict best = winners.best;
-    Cost* __restrict before = winners.before;
-    Cost* __restrict second = winners.second;
-    Cost* __restrict lower = winners.lower;
-    Cost* __restrict centre = winners.centre;
-    Cost* __restrict upper = winners.upper;
-    std::int16_t* __restrict best_index = winners.index;
-    const auto now = static_cast<std::int16_t>(index);
-    const auto previous = static_cast<std::int16_t>(index - 1);
-#pragma GCC ivdep
-    for (int x = 0; x < width; ++x) {
-        // Everything is read and written whatever wins: a loop without branches.
-        const Cost cost = costs[x];
-        const Cost old_best = best[x];
-        const Cost old_before = before[x];
-        const Cost old_second = second[x];
-        const Cost old_lower = lower[x];
-        const Cost old_centre = centre[x];
-        const Cost old_upper = upper[x];
-        const Cost here = refined[x];
-        const Cost there = refined_before[x];
-        const std::int16_t old_index = best_index[x];
-        const Cost wins = mask_if(cost < old_best);
-        // Against a new winner stands the lowest cost of all disparities but the last two; against the old
-        // one, this cost too once it is more than one disparity away.
-        const Cost rival = old_index < previous ? cost : kNoCost;
-        const Cost challenger = rival < old_second ? rival : old_second;
-        second[x] = pick(wins, old_before, challenger);
-        before[x] = old_best;
-        best[x] = pick(wins, cost, old_best);
-        best_index[x] = pick(wins, now, old_index);
-        lower[x] = pick(wins, there, old_lower);
-        centre[x] = pick(wins, here, old_centre);
-        upper[x] = pick(mask_if(old_index == previous), here, old_upper);
-    }
+    select_row_with_evidence(costs, refined, refined_before, index, width, winners.best, winners.index,
+                             winners.before, winners.second, winners.lower, winners.centre, winners.upper);
 }
 
 GROUNDLINE_KERNEL void select_right(const Cost* __restrict costs, int index, int disparity, int width,
