@@ -15,9 +15,9 @@ inline constexpr std::string_view kImageFormats = "PNG, JPEG, PGM/PPM, TIFF or B
 bool looks_like_image(std::span<const std::uint8_t> bytes);
 
 // Empty when nothing is wrong, else the rest of a sentence: "the file is empty", "it is not ...", "the JPEG
-// data end too early (truncated)". PNG and JPEG are walked to their end marker, because decoders fill what is
-// missing with grey (JPEG) or print to stderr by themselves (PNG); BMP and binary PGM/PPM are held against
-// the size in their header. TIFF is left to its decoder.
+// data end too early (truncated file)". PNG and JPEG are walked to their end mark; BMP and binary PGM/PPM are
+// held against the size in their header. Decoders fill what is missing with grey (JPEG) or print lines of
+// their own to stderr (PNG, BMP, PGM/PPM). TIFF is left to its decoder.
 std::string image_fault(std::span<const std::uint8_t> bytes);
 
 }  // namespace groundline::io

@@ -37,9 +37,9 @@ std::uint8_t mix(unsigned own, unsigned tint, unsigned tint_share) {
 }
 
 // A line between points far outside as well, cut to the picture first so that no coordinate overflows.
-void draw_line(cv::Mat& image, double x0, double y0, double x1, double y1, const Colour& colour,
-               int thickness) {
+void draw_line(cv::Mat& image, double x0, double y0, double x1, double y1, const Colour& colour) {
     const double dx = x1 - x0, dy = y1 - y0;
+    if (!std::isfinite(dx) || !std::isfinite(dy)) return;
     double from = 0.0, to = 1.0;
     const auto cut = [&](double start, double step, double least, double most) {
         if (step == 0.0) {
@@ -58,13 +58,17 @@ void draw_line(cv::Mat& image, double x0, double y0, double x1, double y1, const
         return cv::Point(static_cast<int>(std::floor((x0 + t * dx) * kOne + 0.5)),
                          static_cast<int>(std::floor((y0 + t * dy) * kOne + 0.5)));
     };
-    cv::line(image, point(from), point(to), scalar_of(colour), thickness, cv::LINE_AA, kLineShift);
+    cv::line(image, point(from), point(to), scalar_of(colour), 1, cv::LINE_AA, kLineShift);
+}
+
+double offset_px(const FrameResult& result) {
+    return result.rig.calibrated ? result.rig.offset_px() : 0.0;
 }
 
 // The largest true disparity that the histogram, and so the search, can hold.
 double largest_disparity_px(const FrameResult& result) {
     const VDisparity& v = result.v_disparity;
-    return v.first_px + static_cast<double>(v.histogram.width) / v.bins_per_px - result.rig.offset_px();
+    return v.first_px + static_cast<double>(v.histogram.width) / v.bins_per_px - offset_px(result);
 }
 
 // range_colour for each q4 disparity from 0 to the largest, so that a pixel costs one look-up.
@@ -93,14 +97,13 @@ void paint_base(const FrameResult& result, Image8& to) {
 void tint_classes(const FrameResult& result, Image8& to) {
     const std::vector<Colour> table = colour_table(largest_disparity_px(result));
     const int last = static_cast<int>(table.size()) - 1;
-    const int offset_q4 = static_cast<int>(std::floor(result.rig.offset_px() * kDisparityOne + 0.5));
+    const int offset_q4 = static_cast<int>(std::floor(offset_px(result) * kDisparityOne + 0.5));
     for (int y = 0; y < to.height; ++y) {
         const TerrainClass* classes = result.mask.row(y);
         const std::int16_t* disparity = result.disparity.disparity_q4.row(y);
         const Invalid* invalid = result.disparity.invalid.row(y);
         std::uint8_t* pixel = to.bytes.data() + 3 * static_cast<std::ptrdiff_t>(y) * to.width;
-        // Obstacle pixels without a disparity (holes closed by the classifier) take their left neighbour's
-        // hue.
+        // Obstacle pixels without a disparity (holes the classifier closed) take the hue on their left.
         Colour hue = table.front();
         for (int x = 0; x < to.width; ++x, pixel += 3) {
             if (invalid[x] == Invalid::kNone)
@@ -129,11 +132,9 @@ void tint_classes(const FrameResult& result, Image8& to) {
 void draw_horizon(const FrameResult& result, cv::Mat& image) {
     const DisparityPlane& plane = result.ground.plane;
     if (!result.ground.found || plane.dv == 0.0) return;
-    const auto row_at = [&](double u) {
-        return (result.rig.offset_px() - plane.d0 - plane.du * u) / plane.dv;
-    };
+    const auto row_at = [&](double u) { return (offset_px(result) - plane.d0 - plane.du * u) / plane.dv; };
     const double right = image.cols - 1.0;
-    draw_line(image, 0.0, row_at(0.0), right, row_at(right), kHorizonColour, 1);
+    draw_line(image, 0.0, row_at(0.0), right, row_at(right), kHorizonColour);
 }
 
 // Lines no wider than the picture: words are the verdict and its reasons.
@@ -191,6 +192,57 @@ unsigned log2_q8(unsigned n) {
     return octave * 256 + ((value - (1U << octave)) << 8U >> octave);
 }
 
+// `merge` bins make a column. A single bin's column shows the sum over one pixel of disparity around it, so
+// that whole-pixel disparities do not leave three of four columns empty. Full brightness is a third of a row
+// in one pixel of disparity; the square of the logarithm keeps single mismatches dim beside what many rows
+// agree on.
+void paint_counts(const FrameResult& result, int merge, Image8& to) {
+    const VDisparity& v = result.v_disparity;
+    const unsigned full = log2_q8(static_cast<unsigned>(kDisparityOne * std::max(1, result.left.width / 3)));
+    const int before = merge == 1 ? v.bins_per_px / 2 : 0;
+    const int after = merge == 1 ? v.bins_per_px - before : merge;
+    for (int y = 0; y < to.height; ++y) {
+        const std::uint16_t* row = v.histogram.row(y);
+        std::uint8_t* pixel = to.bytes.data() + 3 * static_cast<std::ptrdiff_t>(y) * to.width;
+        for (int x = 0; x < to.width; ++x, pixel += 3) {
+            const int end = std::min(v.histogram.width, x * merge + after);
+            unsigned sum = 0;
+            for (int bin = std::max(0, x * merge - before); bin < end; ++bin)
+                sum += row[bin];
+            const unsigned share_q8 = std::min(256U, log2_q8(sum) * 256 / full);
+            pixel[0] = pixel[1] = pixel[2] = static_cast<std::uint8_t>((share_q8 * share_q8 * 255) >> 16U);
+        }
+    }
+}
+
+// Ground line and tolerance at the middle column, all from the horizon down to the last row.
+void draw_ground(const FrameResult& result, int merge, Image8& to) {
+    const VDisparity& v = result.v_disparity;
+    const Ground& ground = result.ground;
+    if (!ground.found || ground.plane.dv == 0.0) return;
+    const double offset = offset_px(result);
+    const double first_row_px = ground.plane.at(0.5 * (result.left.width - 1.0), 0.0) - offset;  // true
+    const double horizon_row = -first_row_px / ground.plane.dv;
+    const double last_row = to.height - 1.0;
+    const double last_row_px = first_row_px + ground.plane.dv * last_row;
+    if (last_row_px <= 0.0) return;
+    const auto column = [&](double true_px) {
+        return ((true_px + offset - v.first_px) * v.bins_per_px + 0.5) / merge - 0.5;
+    };
+    cv::Mat image = matrix_of(to);
+    const auto draw = [&](double factor, const Colour& colour) {
+        draw_line(image, column(0.0), horizon_row, column(factor * last_row_px), last_row, colour);
+    };
+    // H = h (1 - d_g / d): what stands t h above the ground has d = d_g / (1 - t).
+    const double ratio = ground.metric && result.tolerance_m > 0.0 ? result.tolerance_m / ground.pose.height_m
+                                                                   : result.tolerance_ratio;
+    if (ratio > 0.0) {
+        draw(1.0 / (1.0 + ratio), kToleranceColour);
+        if (ratio < 1.0) draw(1.0 / (1.0 - ratio), kToleranceColour);
+    }
+    draw(1.0, kGroundLineColour);
+}
+
 }  // namespace
 
 Colour range_colour(double disparity_px, double largest_px) {
@@ -217,56 +269,11 @@ void paint_overlay(const FrameResult& result, Image8& to) {
 
 void paint_v_disparity(const FrameResult& result, Image8& to) {
     const VDisparity& v = result.v_disparity;
-    const int bins = v.histogram.width;
-    const int merge = bins > result.left.width ? v.bins_per_px : 1;  // bins in a column
-    const int width = (bins + merge - 1) / merge;
-    resize(to, width, v.histogram.height);
+    const int merge = v.histogram.width > result.left.width ? v.bins_per_px : 1;
+    resize(to, (v.histogram.width + merge - 1) / merge, v.histogram.height);
     if (to.bytes.empty()) return;
-
-    // A column shows the sum over one pixel of disparity around it, so that whole-pixel disparities do not
-    // leave three of four columns empty. Full brightness is a third of a row in one pixel of disparity;
-    // the square of the logarithm keeps single mismatches dim beside what many rows agree on.
-    const unsigned full = log2_q8(static_cast<unsigned>(kDisparityOne * std::max(1, result.left.width / 3)));
-    const int reach = merge == 1 ? v.bins_per_px / 2 : 0;
-    for (int y = 0; y < to.height; ++y) {
-        const std::uint16_t* row = v.histogram.row(y);
-        std::uint8_t* pixel = to.bytes.data() + 3 * static_cast<std::ptrdiff_t>(y) * width;
-        for (int x = 0; x < width; ++x, pixel += 3) {
-            const int first = std::max(0, x * merge - reach);
-            const int end =
-                std::min(bins, merge == 1 ? x + std::max(1, v.bins_per_px - reach) : (x + 1) * merge);
-            unsigned sum = 0;
-            for (int bin = first; bin < end; ++bin)
-                sum += row[bin];
-            const unsigned share_q8 = std::min(256U, log2_q8(sum) * 256 / full);
-            const auto grey = static_cast<std::uint8_t>((share_q8 * share_q8 * 255) >> 16U);
-            pixel[0] = pixel[1] = pixel[2] = grey;
-        }
-    }
-
-    const Ground& ground = result.ground;
-    if (!ground.found || ground.plane.dv == 0.0) return;
-    const double offset_px = result.rig.offset_px();
-    const double at_centre = ground.plane.d0 + ground.plane.du * 0.5 * (result.left.width - 1.0) - offset_px;
-    const double horizon_row = -at_centre / ground.plane.dv;
-    const double bottom_row = to.height - 1.0;
-    const double bottom_px = at_centre + ground.plane.dv * bottom_row;  // true disparity there
-    if (bottom_px <= 0.0) return;
-    const auto column = [&](double true_px) {
-        return ((true_px + offset_px - v.first_px) * v.bins_per_px + 0.5) / merge - 0.5;
-    };
-    cv::Mat image = matrix_of(to);
-    const auto draw = [&](double factor, const Colour& colour, int thickness) {
-        draw_line(image, column(0.0), horizon_row, column(factor * bottom_px), bottom_row, colour, thickness);
-    };
-    // H = h (1 - d_g / d): what stands t h above the ground has d = d_g / (1 - t).
-    const double ratio = ground.metric && result.tolerance_m > 0.0 ? result.tolerance_m / ground.pose.height_m
-                                                                   : result.tolerance_ratio;
-    if (ratio > 0.0) {
-        draw(1.0 / (1.0 + ratio), kToleranceColour, 1);
-        if (ratio < 1.0) draw(1.0 / (1.0 - ratio), kToleranceColour, 1);
-    }
-    draw(1.0, kGroundLineColour, 1);
+    paint_counts(result, merge, to);
+    draw_ground(result, merge, to);
 }
 
 }  // namespace groundline::io
