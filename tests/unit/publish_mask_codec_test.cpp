@@ -329,6 +329,10 @@ TEST(MaskDecoder, TakesAMessage) {
     message.size = -1;
     EXPECT_FALSE(decode_mask(message, out));
     message.size = static_cast<std::int32_t>(packed.size);
+    message.data.resize(packed.size - 1);
+    EXPECT_FALSE(decode_mask(message, out)) << "says that it holds more than it does";
+    message.data.resize(packed.size);
+    EXPECT_TRUE(decode_mask(message, out));
     message.width = 1 << 30;
     EXPECT_FALSE(decode_mask(message, out));
 }

@@ -240,6 +240,10 @@ TEST(Verdict, HoldsForTheHoldTimeAndNoLonger) {
     ancient.exposure_mono_ns = std::numeric_limits<std::int64_t>::min();
     EXPECT_EQ(decide(evidence, ancient, std::numeric_limits<std::int64_t>::max(), kLimits).verdict,
               Verdict::kBlind);
+    State future = state;
+    future.exposure_mono_ns = std::numeric_limits<std::int64_t>::max();
+    EXPECT_EQ(decide(evidence, future, std::numeric_limits<std::int64_t>::min(), kLimits).verdict,
+              Verdict::kBlind);
 }
 
 TEST(Verdict, APoseMayMoveTwoDegreesAFrame) {
