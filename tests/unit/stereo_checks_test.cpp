@@ -86,6 +86,21 @@ TEST(StereoChecks, FlatPatchIsTextureAndBrightPatchSaturation) {
             ASSERT_EQ(result.reason(x, y), Invalid::kNone) << x << ", " << y;
 }
 
+// Saturation is judged on the view as given: without its local mean, white is grey.
+TEST(StereoChecks, SaturationIsSeenThroughTheLocalMean) {
+    OwnedPair pair = test::shifted_pair(160, 80, 212, 8);
+    for (OwnedLuma* view : {&pair.left, &pair.right})
+        view->fill([&](int x, int y) {
+            return x >= 80 && x < 120 && (x + y) % 3 != 0 ? 255 : static_cast<int>(view->at(x, y));
+        });
+    MatcherConfig config = checked(32);
+    config.normalise_local_mean = true;
+    const OwnedResult result = match_fast(config, pair.left.view(), pair.right.view());
+    for (int y = 0; y < 80; ++y)
+        for (int x = 86; x < 114; ++x)
+            ASSERT_EQ(result.reason(x, y), Invalid::kSaturation) << x << ", " << y;
+}
+
 TEST(StereoChecks, BestAtTheLastDisparityIsNearerThanTheRange) {
     for (const int disparity : {14, 15}) {
         const OwnedPair pair = test::shifted_pair(120, 60, 202, disparity);
