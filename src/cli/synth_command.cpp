@@ -148,7 +148,8 @@ int run_synth(const SynthOptions& options) {
             fmt::print(stderr, "{} of {} frames\n", frame + 1, renderer.scene().frames);
     }
     io::write_file_whole(options.out / "truth.json", summary.dump(1) + "\n");
-    fmt::print("{} frames of '{}' with truth in {}\n", frame, renderer.scene().name, options.out.string());
+    fmt::print("{} frame{} of '{}' with truth in {}\n", frame, frame == 1 ? "" : "s", renderer.scene().name,
+               options.out.string());
     const bool complete = frame == renderer.scene().frames;
     return static_cast<int>(complete ? ExitStatus::kDone : ExitStatus::kInterrupted);
 }

@@ -1,12 +1,15 @@
 // `groundline synth`: the folder it writes, read back, and the folders it leaves alone.
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <thread>
 
 #include "cli/synth_command.hpp"
 #include "core/deterministic_math.hpp"
@@ -134,6 +137,31 @@ TEST_F(SynthCommand, CalibrationHasAllDigits) {
     EXPECT_EQ(left[6], 11.5);
     EXPECT_EQ(right[2], 15.5);
     EXPECT_NEAR((left[3] - right[3]) / left[0], 0.1234567890123, 1e-15);
+}
+
+TEST_F(SynthCommand, AnInterruptLeavesWholeFramesAndSaysSo) {
+    const fs::path out = folder_ / "out";
+    EXPECT_EXIT(
+        {
+            std::jthread hand([&] {
+                while (!fs::exists(out / "left" / "000002.png"))
+                    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+                raise(SIGINT);
+            });
+            const int status = run_synth({"boxes?width=32&height=24&frames=1000000", {}, out, 0.2});
+            hand.join();
+            std::exit(status);
+        },
+        testing::ExitedWithCode(130), "");
+    const nlohmann::json truth = nlohmann::json::parse(text_of(out / "truth.json"));
+    const std::size_t frames = truth.at("frames").size();
+    EXPECT_GE(frames, 3U);
+    for (const char* name : {"left", "right", "disp", "occluded", "class", "height"}) {
+        std::size_t files = 0;
+        for ([[maybe_unused]] const auto& entry : fs::directory_iterator(out / name))
+            ++files;
+        EXPECT_EQ(files, frames) << name;
+    }
 }
 
 TEST_F(SynthCommand, UsesTheScenesOwnNumberOfFrames) {
