@@ -110,8 +110,8 @@ Rectification rectification_of(const StereoCalibration& calibration, int width, 
     if (!zoom.covered(covered, kCoarse))
         throw Refusal(ExitStatus::kConfig,
                       calibration.source +
-                          ": the two cameras look at different things, so that rectified views "
-                          "would share nothing; check the rotation between them");
+                          ": no rectified view lies within both pictures; check the rotation "
+                          "between the cameras and the distortion of their lenses");
     // Outwards in steps of 2 %: a bisection from the start could land where a lens model has turned back.
     const double least = 0.4 * mean;
     double open = covered;

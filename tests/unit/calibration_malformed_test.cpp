@@ -257,6 +257,15 @@ TEST(MalformedCalibration, WhatIsNoCalibrationAtAll) {
     refused("left.png", std::string("\x89PNG\r\n\x1a\n\0\0", 10), "not a text file");
     refused("big.yaml", std::string((1 << 20) + 1, ' '), "too many for a calibration");
     refused("deep.yaml", std::string(100000, '['), "not readable as YAML");
+    refused("laughs.yaml",
+            "a: &a [0, 0, 0, 0, 0, 0, 0, 0, 0, 0]\nb: &b [*a, *a, *a, *a, *a, *a, *a, *a, *a, *a]\n"
+            "c: &c [*b, *b, *b, *b, *b, *b, *b, *b, *b, *b]\nd: &d [*c, *c, *c, *c, *c, *c, *c, *c, *c, *c]\n"
+            "M1: [*d, *d, *d, *d, *d, *d, *d, *d, *d, *d]\n",
+            "M1: has more than 10000 elements");
+    std::string nested = "<opencv_storage>";
+    for (int i = 0; i < 100000; ++i)
+        nested += "<a><!-- </a> -->";
+    refused("nested.xml", nested.substr(0, 1 << 20), "more than 2000 elements");
     refused("tab.yaml", "cam0:\n\tintrinsics: 3\n", "not readable as YAML");
 }
 

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <boost/property_tree/ptree.hpp>
 #include <boost/property_tree/xml_parser.hpp>
 #include <cmath>
@@ -13,18 +12,16 @@ namespace {
 
 namespace tree = boost::property_tree;
 
-constexpr int kDeepest = 32;  // no calibration nests deeper; bounds the recursion on hostile files
+// Far more than any calibration has; they bound recursion and work on hostile files.
+constexpr int kMostElements = 2000;
+constexpr int kMostNumbers = 10000;
+constexpr int kDeepest = 32;
 
-// Elements within elements, before a parser recurses into them.
-int xml_depth(const std::string& text) {
-    int depth = 0;
-    int deepest = 0;
-    for (std::size_t i = 0; i + 1 < text.size(); ++i) {
-        if (text[i] == '<' && text[i + 1] != '?' && text[i + 1] != '!') depth += text[i + 1] == '/' ? -1 : 1;
-        if (text[i] == '/' && text[i + 1] == '>') --depth;
-        deepest = std::max(deepest, depth);
-    }
-    return deepest;
+int count_elements(const std::string& xml) {
+    int count = 0;
+    for (std::size_t i = 0; i + 1 < xml.size(); ++i)
+        if (xml[i] == '<' && xml[i + 1] != '/' && xml[i + 1] != '?' && xml[i + 1] != '!') ++count;
+    return count;
 }
 
 // OpenCV's way with XML: an element holds named elements, or elements named "_", or words between blanks.
@@ -47,7 +44,8 @@ YAML::Node converted(const tree::ptree& from) {
 
 // Not through cv::FileStorage: 4.6 reads beyond the end of a file that is cut within a tag.
 YAML::Node from_xml(const SourceText& source) {
-    if (xml_depth(source.text) > kDeepest) refuse(source.path, 0, "not OpenCV XML: elements nest too deep");
+    if (count_elements(source.text) > kMostElements)
+        refuse(source.path, 0, fmt::format("more than {} elements, expected OpenCV XML", kMostElements));
     std::istringstream stream(source.text);
     tree::ptree document;
     try {
@@ -73,16 +71,26 @@ YAML::Node from_yaml(const SourceText& source) {
     }
 }
 
-void append_numbers(const YAML::Node& node, int depth, const YamlField& field, std::vector<double>& out) {
+// `budget`: nodes that may still be visited, since aliases can make a small file large.
+void append_numbers(const YAML::Node& node, int depth, int& budget, const YamlField& field,
+                    std::vector<double>& out) {
+    if (--budget < 0) field.refuse(fmt::format("has more than {} elements", kMostNumbers));
     if (node.IsSequence() && depth < kDeepest) {
         for (const YAML::Node& item : node)
-            append_numbers(item, depth + 1, field, out);
+            append_numbers(item, depth + 1, budget, field, out);
         return;
     }
     const std::string word = node.IsScalar() ? node.Scalar() : std::string();
     const std::optional<double> value = parse_number(word);
     if (!value) field.refuse(fmt::format("\"{}\" is not a finite number", word.substr(0, 40)));
     out.push_back(*value);
+}
+
+std::vector<double> all_numbers(const YAML::Node& node, const YamlField& field) {
+    std::vector<double> values;
+    int budget = kMostNumbers;
+    append_numbers(node, 0, budget, field, values);
+    return values;
 }
 
 }  // namespace
@@ -123,10 +131,8 @@ std::string YamlField::text() const {
 }
 
 double YamlField::number() const {
-    std::vector<double> value;
     if (!node_.IsScalar()) refuse("expected a number");
-    append_numbers(node_, 0, *this, value);
-    return value.front();
+    return all_numbers(node_, *this).front();
 }
 
 int YamlField::whole_number() const {
@@ -138,9 +144,7 @@ int YamlField::whole_number() const {
 
 std::vector<double> YamlField::numbers() const {
     if (!node_.IsSequence()) refuse("expected a list of numbers");
-    std::vector<double> values;
-    append_numbers(node_, 0, *this, values);
-    return values;
+    return all_numbers(node_, *this);
 }
 
 std::vector<double> YamlField::numbers(std::size_t count) const {
