@@ -37,7 +37,8 @@ std::uint8_t mix(unsigned own, unsigned tint, unsigned tint_share) {
 }
 
 // A line between points far outside as well, cut to the picture first so that no coordinate overflows.
-void draw_line(cv::Mat& image, double x0, double y0, double x1, double y1, const Colour& colour) {
+void draw_line(cv::Mat& image, double x0, double y0, double x1, double y1, const Colour& colour,
+               int thickness = 1) {
     const double dx = x1 - x0, dy = y1 - y0;
     if (!std::isfinite(dx) || !std::isfinite(dy)) return;
     double from = 0.0, to = 1.0;
@@ -58,7 +59,7 @@ void draw_line(cv::Mat& image, double x0, double y0, double x1, double y1, const
         return cv::Point(static_cast<int>(std::floor((x0 + t * dx) * kOne + 0.5)),
                          static_cast<int>(std::floor((y0 + t * dy) * kOne + 0.5)));
     };
-    cv::line(image, point(from), point(to), scalar_of(colour), 1, cv::LINE_AA, kLineShift);
+    cv::line(image, point(from), point(to), scalar_of(colour), thickness, cv::LINE_AA, kLineShift);
 }
 
 double offset_px(const FrameResult& result) {
@@ -230,17 +231,17 @@ void draw_ground(const FrameResult& result, int merge, Image8& to) {
         return ((true_px + offset - v.first_px) * v.bins_per_px + 0.5) / merge - 0.5;
     };
     cv::Mat image = matrix_of(to);
-    const auto draw = [&](double factor, const Colour& colour) {
-        draw_line(image, column(0.0), horizon_row, column(factor * last_row_px), last_row, colour);
+    const auto draw = [&](double factor, const Colour& colour, int thickness) {
+        draw_line(image, column(0.0), horizon_row, column(factor * last_row_px), last_row, colour, thickness);
     };
     // H = h (1 - d_g / d): what stands t h above the ground has d = d_g / (1 - t).
     const double ratio = ground.metric && result.tolerance_m > 0.0 ? result.tolerance_m / ground.pose.height_m
                                                                    : result.tolerance_ratio;
     if (ratio > 0.0) {
-        draw(1.0 / (1.0 + ratio), kToleranceColour);
-        if (ratio < 1.0) draw(1.0 / (1.0 - ratio), kToleranceColour);
+        draw(1.0 / (1.0 + ratio), kToleranceColour, 1);
+        if (ratio < 1.0) draw(1.0 / (1.0 - ratio), kToleranceColour, 1);
     }
-    draw(1.0, kGroundLineColour);
+    draw(1.0, kGroundLineColour, 2);
 }
 
 }  // namespace

@@ -207,7 +207,11 @@ TEST(Picture, VDisparityBrightnessGrowsWithTheCountAndWideHistogramsAreMerged) {
     for (int y = 1; y < kHeight; ++y)
         EXPECT_GE(pixel(v, 40, y)[0], pixel(v, 40, y - 1)[0]);
     EXPECT_EQ(pixel(v, 40, kHeight - 1)[0], 255);
-    EXPECT_EQ(pixel(v, 39, 60), pixel(v, 40, 60)) << "a whole-pixel disparity fills its pixel";
+    // A whole-pixel disparity fills its pixel, from half a pixel before it.
+    for (const int x : {39, 41, 42})
+        EXPECT_EQ(pixel(v, x, 60), pixel(v, 40, 60));
+    for (const int x : {38, 43})
+        EXPECT_EQ(pixel(v, x, 60), (Colour{0, 0, 0}));
     EXPECT_EQ(pixel(v, 50, 60), (Colour{0, 0, 0}));
 
     made.result.v_disparity.histogram = made.arena.image<std::uint16_t>(64 * 4, kHeight);
