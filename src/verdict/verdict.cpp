@@ -44,6 +44,7 @@ constexpr bool magnitude_at_most(double value, double limit) {
 
 bool is_fresh(const State& state, std::int64_t now_mono_ns, const Limits& limits) {
     if (!state.has_ground || now_mono_ns < state.exposure_mono_ns) return false;
+    if (state.frames_since >= limits.hold_frames) return false;
     // Unsigned, because stamps from files may lie further apart than int64 holds.
     const std::uint64_t age =
         static_cast<std::uint64_t>(now_mono_ns) - static_cast<std::uint64_t>(state.exposure_mono_ns);
@@ -132,8 +133,8 @@ Decision decide(const Evidence& evidence, const State& state, std::int64_t now_m
 
 State next_state(const Decision& decision, const State& state, std::int64_t now_mono_ns,
                  const Limits& limits) {
-    const bool own = decision.use == GroundUse::kOwn || decision.use == GroundUse::kWeak;
-    if (own && within(decision.reasons, kRemembered)) return {true, decision.ground, now_mono_ns, 0};
+    // A ground that is not the frame's own always comes with a further reason.
+    if (within(decision.reasons, kRemembered)) return {true, decision.ground, now_mono_ns, 0};
     if (!is_fresh(state, now_mono_ns, limits)) return {};
     State next = state;
     ++next.frames_since;

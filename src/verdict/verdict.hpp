@@ -44,6 +44,8 @@ struct Limits {
     // For how long an earlier ground may stand in. A robot at 1 m/s has then moved by half its stopping
     // distance.
     std::int64_t hold_ns = 1'000'000'000;
+    // The same by count, for sources whose stamps stand still: one second at 60 Hz.
+    std::int64_t hold_frames = 60;
 };
 
 // What is remembered from frame to frame: the last ground that passed every check of its own.
@@ -65,10 +67,9 @@ struct Decision {
 // run did. Three cases, the thresholds from Limits:
 //
 // - kNoGround, kWall, kOutsideGate, kPoseJump, kAmbiguous, kFewInliers, kShortLine: what was found may be no
-//   ground at all. The remembered one stands in while it is no older than hold_ns: degraded, with
-//   kHeldGround. Else blind.
-// - Any other reason but kNoMountPrior: it is the ground, but thin or seen badly: degraded, on the frame's
-// own.
+//   ground at all. The remembered one stands in while it is fresh, at most hold_ns and hold_frames old:
+//   degraded, with kHeldGround. Else blind.
+// - Any other reason but kNoMountPrior: it is ground, but thin or seen badly: degraded, on the frame's own.
 // - None of them: trusted; a first frame may be.
 //
 // kPoseJump compares with the remembered ground while that is fresh. A stamp before the remembered one means

@@ -374,6 +374,15 @@ TEST(Memory, AHeldGroundIsNotRememberedAnew) {
     EXPECT_EQ(run.step(good_evidence(), 2100 * kMs).verdict, Verdict::kTrusted);
 }
 
+TEST(Memory, StampsThatStandStillHoldNothingForEver) {
+    Evidence lost = good_evidence();
+    lost.ground_fit.line_found = false;
+    Drive run;
+    run.step(good_evidence(), 0);
+    for (int frame = 1; frame <= 70; ++frame)
+        EXPECT_EQ(run.step(lost, 0).use, frame <= 60 ? GroundUse::kHeld : GroundUse::kNone) << frame;
+}
+
 TEST(Memory, AStepOfTheRobotIsBelievedWhenItCouldHaveMovedThere) {
     Drive run;
     run.step(good_evidence(), 0);
