@@ -23,11 +23,6 @@ constexpr int kTallyStep = 2;  // columns; every row is tallied, for its support
 constexpr double kFocalMin = 0.5, kFocalMax = 1.5;
 constexpr double kSlopeMin = 0.015, kSlopeMax = 1.0;
 
-// The reach of a test of `tolerance_px` where the ground has `ground_px`, as in the plane fit.
-double reach_of(double tolerance_px, double ground_px) {
-    return std::min(tolerance_px, 0.5 + 0.25 * ground_px);
-}
-
 }  // namespace
 
 GroundFinder::GroundFinder(const TerrainConfig& config, const RectifiedRig& rig, int min_disparity,
@@ -266,7 +261,7 @@ void GroundFinder::tally(ConstDisparityMap map, const DisparityPlane& plane, Par
                 ++row.valid;
                 const double residual = disparity[u] * (1.0 / kDisparityOne) - expected;
                 const double size = std::fabs(residual);
-                const double most = reach_of(kResidualPx, expected - offset_px_);
+                const double most = reach_px(kResidualPx, expected - offset_px_);
                 if (size >= most) continue;
                 row.near += size <= kNearPx ? 1 : 0;
                 if (size <= kInlierPx) {
@@ -283,8 +278,9 @@ void GroundFinder::tally(ConstDisparityMap map, const DisparityPlane& plane, Par
     });
 }
 
-double GroundFinder::chance(double reach_px) const {
-    return std::min(1.0, 2.0 * reach_px / disparities_);
+// Share of pixels spread evenly over the search range that lie within so many pixels of any plane.
+double GroundFinder::chance(double within_px) const {
+    return std::min(1.0, 2.0 * within_px / disparities_);
 }
 
 // Marks the rows this frame's own pixels support and returns the length of their longest run.

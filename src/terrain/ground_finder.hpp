@@ -64,7 +64,7 @@ class GroundFinder {
     bool nearly_same(const DisparityPlane& a, const DisparityPlane& b) const;
     bool leans(const DisparityPlane& plane) const;
     double upright_mass(const VDisparity& v_disparity, int first_row);
-    double chance(double reach_px) const;
+    double chance(double within_px) const;
 
     TerrainConfig config_;
     RectifiedRig rig_;

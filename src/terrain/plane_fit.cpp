@@ -25,11 +25,6 @@ bool invert(const std::array<double, 9>& m, std::array<double, 9>& out) {
     return true;
 }
 
-// What part of a tolerance is left at a ground disparity (true): far away, 5 px would be metres.
-double reach_of(double tolerance_px, double ground_px) {
-    return std::min(tolerance_px, 0.5 + 0.25 * ground_px);
-}
-
 double tukey(double t) {
     const double inside = 1.0 - t * t;
     return inside * inside;
@@ -103,7 +98,7 @@ PlaneFitResult PlaneFit::converge(const DisparityPlane& start, double first_tole
             const double expected = plane.at(sample.u, sample.v);
             const double residual = sample.d_px - expected;
             const double ground = expected - offset_px_;
-            const double reach = reach_of(tolerance, ground);
+            const double reach = reach_px(tolerance, ground);
             if (ground < 1.0 || !(residual < reach && residual > -reach)) continue;
             const double weight = tukey(residual / reach);
             const double x = sample.u - 0.5 * width_;
@@ -144,7 +139,7 @@ void PlaneFit::sum_rows(ConstDisparityMap map, const DisparityPlane& plane, doub
                 if (invalid[u] != Invalid::kNone) continue;
                 const double expected = plane.du * u + at_row;
                 const double ground = expected - offset_px_;
-                const double reach = reach_of(tolerance_px, ground);
+                const double reach = reach_px(tolerance_px, ground);
                 const double residual = disparity[u] * (1.0 / kDisparityOne) - expected;
                 if (ground < 1.0 || !(residual < reach && residual > -reach)) continue;
                 const double weight = tukey(residual / reach);
@@ -214,7 +209,7 @@ void PlaneFit::covariance(ConstDisparityMap map, Parallel& parallel, PlaneFitRes
                 if (invalid[u] != Invalid::kNone) continue;
                 const double expected = plane.du * u + at_row;
                 const double ground = expected - offset_px_;
-                const double reach = reach_of(kTolerancePx, ground);
+                const double reach = reach_px(kTolerancePx, ground);
                 const double residual = disparity[u] * (1.0 / kDisparityOne) - expected;
                 if (ground < 1.0 || !(residual < reach && residual > -reach)) continue;
                 const double t2 = residual * residual / (reach * reach);

@@ -1,6 +1,7 @@
 // Robust fit of the ground plane in disparity space, with an honest covariance.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <span>
 
@@ -18,11 +19,17 @@ struct PlaneFitResult {
     double weight = 0.0;                 // sum of the weights, about the number of samples on the plane
 };
 
+// How far from the ground a pixel may lie to take part, where the ground's true disparity is ground_px: the
+// tolerance, but never more than half a pixel and a quarter of that disparity, so that far away a thing of a
+// few decimetres is not taken for ground.
+inline double reach_px(double tolerance_px, double ground_px) {
+    return std::min(tolerance_px, 0.5 + 0.25 * ground_px);
+}
+
 // Iteratively reweighted least squares with Tukey weights, in two steps: converge() brings any number of
 // rough starts on a thin sample of pixels to the plane next to each, tolerance 5, 4, 3, 2, 1.5 px; fit()
-// refines the best on every second pixel of every second row. A tolerance is never more than 0.5 px + a
-// quarter of the ground's own disparity, so that far away a thing of a few decimetres is not taken for
-// ground.
+// refines the best on every second pixel of every second row. Each within
+// reach_px.
 //
 // Covariance: neighbouring pixels share their matching errors, so counting them as independent would
 // understate it by a factor of 5 to 30. Residuals are summed over tiles of 32 x 32 px, which do not share

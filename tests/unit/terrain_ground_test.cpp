@@ -130,14 +130,17 @@ TEST(GroundV1, AnyPoseIsRecoveredToWhatRoundingAllows) {
 }
 
 TEST(GroundV1, PrincipalPointOffsetChangesNothing) {
-    RectifiedRig rig = rig_of();
-    rig.cx_right_px = rig.cx_px - 11.3;  // measured disparities are larger by 11.3 px
-    Bench bench(rig);
-    World world{rig, pose_deg(12.0, 3.0, 1.2), {}};
-    const Found found = bench.find(world);
-    ASSERT_TRUE(found.ground.found);
-    EXPECT_LT(pitch_error_deg(found, world), 0.004);
-    EXPECT_LT(height_error(found, world), 2e-4);
+    for (const double offset : {11.3, -31.1}) {  // -31.1 px: a Middlebury pair
+        RectifiedRig rig = rig_of(640, 480, 500.0, 0.2);
+        rig.cx_right_px = rig.cx_px - offset;
+        Bench bench(rig, {}, 128);
+        World world{rig, pose_deg(22.0, 3.0, 1.2), {{3.0, 0.3, 0.6, 0.5, 0.8}}};
+        test::render(world, 0, 128, {0.25, 0.3, 0.3, 5}, bench.map);
+        const Found found = bench.find();
+        ASSERT_TRUE(found.ground.found) << offset;
+        EXPECT_LT(pitch_error_deg(found, world), 0.05) << offset;
+        EXPECT_LT(height_error(found, world), 2e-3) << offset;
+    }
 }
 
 TEST(GroundV2, NoiseOutliersBoxesAndRollLeaveThePoseWithinItsBounds) {
@@ -224,6 +227,28 @@ TEST(GroundV4, WallIsNeverAGround) {
         }
 }
 
+// A wall before the robot with a strip of floor at its foot: the strongest thing is upright. Farther away the
+// floor is the stronger and must be found as it is.
+TEST(GroundV4, WallThatFillsTheViewHidesTheGroundAndAFarOneDoesNot) {
+    const RectifiedRig rig = rig_of();
+    Bench bench(rig);
+    for (const double distance : {1.9, 2.1, 2.3}) {
+        World world{rig, pose_deg(12.0, 0.0, 1.2), {}};
+        world.wall_m = distance;
+        const Found found = bench.find(world, {0.25, 0.05, 0.1, 7});
+        expect_no_ground(found);
+        EXPECT_TRUE(found.evidence.wall) << distance;
+    }
+    for (const double distance : {5.0, 8.0, 20.0}) {
+        World world{rig, pose_deg(12.0, 0.0, 1.2), {}};
+        world.wall_m = distance;
+        const Found found = bench.find(world, {0.25, 0.05, 0.1, 7});
+        ASSERT_TRUE(found.ground.found) << distance;
+        EXPECT_FALSE(found.evidence.wall);
+        EXPECT_LT(pitch_error_deg(found, world), 0.25) << distance;
+    }
+}
+
 TEST(GroundV4, WallSeenAtAnAngleIsNeverAGround) {
     const RectifiedRig rig = rig_of();
     Bench bench(rig);
@@ -304,7 +329,7 @@ TEST(GroundFinder, FindsGroundUnderAWeakMatcher) {
     Bench bench(rig);
     Dice dice(11);
     for (int trial = 0; trial < 10; ++trial) {
-        World world{rig, pose_deg(dice.between(5.0, 20.0), dice.between(-5.0, 5.0), 1.3), {}};
+        World world{rig, pose_deg(dice.between(5.0, 20.0), dice.between(-11.0, 11.0), 1.3), {}};
         world.boxes = random_boxes(dice, 2);
         test::render(world, 0, kDisparities, {0.6, 0.5, 0.35, 900U + static_cast<std::uint32_t>(trial)},
                      bench.map);
