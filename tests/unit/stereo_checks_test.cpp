@@ -211,7 +211,7 @@ TEST(StereoChecks, SpecklesAreTheSmallPatchesOfAFloodFill) {
                 for (int x = 0; x < 73; ++x) {
                     const bool valid = random() % 5 != 0;
                     const auto disparity = static_cast<std::int16_t>(
-                        valid ? 12 * static_cast<int>(random() % static_cast<std::uint32_t>(levels)) : 0);
+                        valid ? 8 * static_cast<int>(random() % static_cast<std::uint32_t>(levels)) : 0);
                     for (OwnedResult* result : {&fast, &plain}) {
                         result->map.invalid.at(x, y) = valid ? Invalid::kNone : Invalid::kCost;
                         result->map.disparity_q4.at(x, y) = disparity;

@@ -61,6 +61,32 @@ TEST(PaperMatcher, C7_EqualsThePlainFormOnPureNoiseAndAtEveryOffset) {
     }
 }
 
+// Limits in the middle of what the scene has, so that each test decides both ways.
+TEST(PaperMatcher, C7_EqualsThePlainFormWhereEveryTestBites) {
+    OwnedPair pair = stepped_pair(130, 77, 111);
+    for (test::OwnedLuma* view : {&pair.left, &pair.right}) {
+        const auto spots = test::noise_image(130, 77, 112);
+        view->fill([&](int x, int y) {
+            if (y > 40 && spots.at(x, y) < 12) return 255;
+            const int contrast = y < 20 ? 12 : 1;
+            return 128 + (view->at(x, y) - 128) / contrast;
+        });
+    }
+    for (const bool normalise : {false, true}) {
+        MatcherConfig config;
+        config.disparities = 32;
+        config.min_disparity = -12;  // the nearer surface, 19 px, is the last of the range
+        config.normalise_local_mean = normalise;
+        config.limits = {true, 5, 400, 40, 8, 20, 1, 30};
+        const OwnedResult plain = match_plain(config, pair.left.view(), pair.right.view());
+        EXPECT_EQ(differing_pixels(match_fast(config, pair.left.view(), pair.right.view()), plain), 0);
+        for (const Invalid reason :
+             {Invalid::kNone, Invalid::kBorder, Invalid::kTexture, Invalid::kUniqueness, Invalid::kLeftRight,
+              Invalid::kSaturation, Invalid::kCost, Invalid::kSpeckle, Invalid::kRangeEdge})
+            EXPECT_GT(count_reason(plain, reason), 0) << kInvalidNames[static_cast<std::size_t>(reason)];
+    }
+}
+
 TEST(PaperMatcher, C7_ResultDependsNeitherOnLanesNorOnTheirOrderNorOnBands) {
     const OwnedPair pair = stepped_pair(130, 77, 104);
     MatcherConfig config;
