@@ -88,7 +88,7 @@ struct GroundEvidence {
     double density = 0.0;            // valid pixels among those below the horizon
     double inlier_share = 0.0;       // ground inliers among the valid pixels below the horizon
     double line_run_share = 0.0;     // longest supported run of rows among the rows below the horizon
-    double second_peak_ratio = 0.0;  // strongest non-adjacent Hough peak over the strongest
+    double second_peak_ratio = 0.0;  // the most that a rival plane alone explains, over what the ground does
     double residual_rms_px = 0.0;    // of the inliers, weighted
     double row_residual_px = 0.0;    // mean over rows of |row's mean residual|
     double blocked_share = 0.0;      // invalid or range-edge pixels in the lower third of the picture

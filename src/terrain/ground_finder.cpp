@@ -222,24 +222,14 @@ bool GroundFinder::fit(ConstDisparityMap map, const Gate& gate, Parallel& parall
             if (better(plane, strongest)) strongest = plane;
         if (strongest.weight <= 1.01 * before.weight) break;
     }
+    // A rival counts by what it alone explains: a steeper plane through the same pixels is no second ground.
     second_ratio = 0.0;
     for (const PlaneFitResult& plane : planes)
-        if (plane.found && inside(plane.plane, gate) && !nearly_same(plane.plane, strongest.plane))
-            second_ratio = std::max(second_ratio, plane.weight / strongest.weight);
+        if (plane.found && inside(plane.plane, gate))
+            second_ratio = std::max(second_ratio,
+                                    plane_fit_.own_weight(plane.plane, strongest.plane) / strongest.weight);
     best = plane_fit_.fit(map, strongest.plane, parallel);
     return best.found;
-}
-
-// Two planes are the same ground seen twice when they differ little over the lower part of the picture.
-bool GroundFinder::nearly_same(const DisparityPlane& a, const DisparityPlane& b) const {
-    for (const double row : {0.75 * rig_.height, rig_.height - 1.0}) {
-        for (const double column : {0.25 * rig_.width, 0.75 * rig_.width}) {
-            const double there = a.at(column, row);
-            if (std::fabs(there - b.at(column, row)) > std::max(3.0, 0.15 * (there - offset_px_)))
-                return false;
-        }
-    }
-    return true;
 }
 
 void GroundFinder::tally(ConstDisparityMap map, const DisparityPlane& plane, Parallel& parallel) {

@@ -61,7 +61,6 @@ class GroundFinder {
     void tally(ConstDisparityMap map, const DisparityPlane& plane, Parallel& parallel);
     int support_rows(const DisparityPlane& plane);
     bool inside(const DisparityPlane& plane, const Gate& gate) const;
-    bool nearly_same(const DisparityPlane& a, const DisparityPlane& b) const;
     bool leans(const DisparityPlane& plane) const;
     double upright_mass(const VDisparity& v_disparity, int first_row);
     double chance(double within_px) const;

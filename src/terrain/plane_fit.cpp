@@ -10,6 +10,7 @@ constexpr int kStep = 2;        // every second pixel of every second row
 constexpr int kSamples = 4500;  // of the thin sample: 14 starts of 11 steps take about 2 ms
 constexpr int kTile = 32;       // px, wider than any matching window's reach
 constexpr double kCommonErrorPx = 0.05;
+constexpr double kLastTolerancePx = 1.5;  // at which converge() and fit() end
 
 // Symmetric 3 x 3, row-major; false where it is singular for practical purposes.
 bool invert(const std::array<double, 9>& m, std::array<double, 9>& out) {
@@ -123,6 +124,20 @@ PlaneFitResult PlaneFit::converge(const DisparityPlane& start, double first_tole
     return result;
 }
 
+double PlaneFit::own_weight(const DisparityPlane& plane, const DisparityPlane& other) const {
+    const auto weight_on = [&](const DisparityPlane& candidate, const Sample& sample) {
+        const double expected = candidate.at(sample.u, sample.v);
+        const double residual = sample.d_px - expected;
+        const double reach = reach_px(kLastTolerancePx, expected - offset_px_);
+        if (expected - offset_px_ < 1.0 || !(residual < reach && residual > -reach)) return 0.0;
+        return tukey(residual / reach);
+    };
+    double weight = 0.0;
+    for (std::size_t i = 0; i < samples_used_; ++i)
+        if (weight_on(other, samples_[i]) == 0.0) weight += weight_on(plane, samples_[i]);
+    return weight;
+}
+
 void PlaneFit::sum_rows(ConstDisparityMap map, const DisparityPlane& plane, double tolerance_px,
                         Parallel& parallel) {
     constexpr int kRowsPerTask = 16;
@@ -192,7 +207,6 @@ PlaneFitResult PlaneFit::fit(ConstDisparityMap map, const DisparityPlane& start,
 
 void PlaneFit::covariance(ConstDisparityMap map, Parallel& parallel, PlaneFitResult& result) {
     const DisparityPlane plane = result.plane;
-    constexpr double kTolerancePx = 1.5;
     const double middle_u = 0.5 * width_;
     const double middle_v = 0.5 * height_;
     parallel.for_each(tile_rows_, [&](int tile_row, int) {
@@ -209,7 +223,7 @@ void PlaneFit::covariance(ConstDisparityMap map, Parallel& parallel, PlaneFitRes
                 if (invalid[u] != Invalid::kNone) continue;
                 const double expected = plane.du * u + at_row;
                 const double ground = expected - offset_px_;
-                const double reach = reach_px(kTolerancePx, ground);
+                const double reach = reach_px(kLastTolerancePx, ground);
                 const double residual = disparity[u] * (1.0 / kDisparityOne) - expected;
                 if (ground < 1.0 || !(residual < reach && residual > -reach)) continue;
                 const double t2 = residual * residual / (reach * reach);

@@ -45,6 +45,8 @@ class PlaneFit {
     // Leaves out the tolerances above first_tolerance_px. found is false where too few pixels or a degenerate
     // spread remain; no covariance. May be called from several lanes at once.
     PlaneFitResult converge(const DisparityPlane& start, double first_tolerance_px) const;
+    // Weight of the thin sample on `plane` that is not on `other`: what this plane alone explains.
+    double own_weight(const DisparityPlane& plane, const DisparityPlane& other) const;
     // Sums are in a fixed order, whatever the lanes.
     PlaneFitResult fit(ConstDisparityMap map, const DisparityPlane& start, Parallel& parallel);
 
