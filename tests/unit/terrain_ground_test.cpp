@@ -345,6 +345,28 @@ TEST(GroundFinder, FindsGroundUnderAWeakMatcher) {
     }
 }
 
+// Little ground, much wall, a leaning robot and views whose principal points differ: the first guess must be
+// right, since there is a stronger plane to slide to.
+TEST(GroundFinder, FindsLittleGroundBelowAWallWithRollAndOffset) {
+    RectifiedRig rig = rig_of(640, 480, 500.0, 0.2);
+    rig.cx_right_px = rig.cx_px + 31.0;
+    Bench bench(rig, {}, 128);
+    int found_frames = 0;
+    for (const double roll : {-11.0, -7.0, 7.0, 11.0})
+        for (const double distance : {3.0, 3.5, 4.0}) {
+            World world{rig, pose_deg(12.0, roll, 1.2), {}};
+            world.wall_m = distance;
+            test::render(world, 0, 128, {0.3, 0.15, 0.2, 5}, bench.map);
+            const Found found = bench.find();
+            if (!found.ground.found) continue;
+            ++found_frames;
+            EXPECT_LT(pitch_error_deg(found, world), 0.5) << roll << " " << distance;
+            EXPECT_LT(roll_error_deg(found, world), 0.5) << roll << " " << distance;
+            EXPECT_LT(height_error(found, world), 0.02) << roll << " " << distance;
+        }
+    EXPECT_GE(found_frames, 8);
+}
+
 // Half resolution: f and d halve, the pose stays.
 TEST(GroundG6, HalfResolutionGivesTheSamePose) {
     const RectifiedRig rig = rig_of();
@@ -463,9 +485,13 @@ TEST(GroundFinder, SupportedRowsAreThoseWhereGroundIsSeen) {
     Bench bench(rig);
     World world{rig, pose_deg(12.0, 0.0, 1.2), {}};
     test::render(world, 0, kDisparities, {0.25, 0.05, 0.0, 8}, bench.map);
+    Dice dice(6);
     for (int v = 300; v < 360; ++v)
-        for (int u = 0; u < rig.width; ++u)
-            bench.map.invalid.at(u, v) = Invalid::kTexture;
+        for (int u = 0; u < rig.width; ++u) {
+            // Rows without an answer, and rows that answer anything.
+            bench.map.invalid.at(u, v) = v < 330 ? Invalid::kTexture : Invalid::kNone;
+            bench.map.disparity_q4.at(u, v) = static_cast<std::int16_t>(dice.bits() % (95 * 16));
+        }
     const Found found = bench.find();
     ASSERT_TRUE(found.ground.found);
     const double horizon = rig.cy_px - rig.focal_px * std::tan(world.pose.pitch_rad);
