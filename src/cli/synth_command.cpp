@@ -51,7 +51,7 @@ struct Images {
                 const double disparity = std::floor(truth.disparity_px.at(u, v) * 256.0 + 0.5);
                 const double height = std::floor(truth.height_m.at(u, v) * 1000.0 + 0.5) + 32768.0;
                 const bool seen = truth.seen.at(u, v) != 0;
-                const bool fits = seen && disparity >= 0.0 && disparity <= kMost;
+                const bool fits = disparity >= 0.0 && disparity <= kMost;
                 disparity_q8.at(u, v) = fits ? static_cast<std::uint16_t>(disparity) : 0;
                 height_mm.at(u, v) = seen ? static_cast<std::uint16_t>(std::clamp(height, 1.0, kMost)) : 0;
                 truth.occluded.at(u, v) = truth.occluded.at(u, v) != 0 ? 255 : 0;
