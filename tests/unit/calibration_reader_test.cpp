@@ -46,6 +46,9 @@ TEST(OpenCvFormat, OneYamlFile) {
     expect_sample_stereo(c);
     EXPECT_EQ(c.source, path.string());
     EXPECT_EQ(c.format, "OpenCV stereo");
+    // OpenCV before 3.2 wrote no "---".
+    const auto old = folder.write("old.yml", changed(test::kOpenCvStereo, "---\n", ""));
+    expect_sample_stereo(read_calibration({old}, 640, 480));
 }
 
 // What OpenCV itself writes, in each of its three syntaxes.

@@ -90,6 +90,18 @@ TEST(Photometric, GrossDifferencesShowEvenWhereNoLineFits) {
     EXPECT_EQ(grey_black.dark_share, 1.0);
 }
 
+// Each eighth of the height is off by another amount: no line speaks for a third of the picture.
+TEST(Photometric, ALineThroughLittleOfThePictureIsNotBelieved) {
+    Serial serial;
+    const OwnedLuma right = groundline::test::noise_image(64, 80, 4, 100, 140);
+    OwnedLuma left = right;
+    left.fill([&](int x, int y) { return right.at(x, y) - 60 + 20 * (y / 10); });
+    const PhotometricEvidence evidence = measure_photometric(left.view(), right.view(), serial);
+    EXPECT_GT(evidence.mismatch, 25.0);
+    EXPECT_EQ(evidence.gain, 1.0);
+    EXPECT_EQ(evidence.offset, 0.0);
+}
+
 TEST(Photometric, AConstantStepHasNoGain) {
     Serial serial;
     OwnedLuma a(64, 48), b(64, 48);
@@ -109,6 +121,30 @@ TEST(Photometric, CountsSharesOfTheWorseView) {
     const PhotometricEvidence evidence = measure_photometric(a.view(), b.view(), serial);
     EXPECT_DOUBLE_EQ(evidence.overexposed_share, 0.20);
     EXPECT_DOUBLE_EQ(evidence.dark_share, 0.15);
+    OwnedLuma light(100, 80);
+    light.fill([](int, int y) { return 60 + y; });
+    EXPECT_DOUBLE_EQ(measure_photometric(a.view(), light.view(), serial).dark_share, 0.10);
+    EXPECT_DOUBLE_EQ(measure_photometric(light.view(), a.view(), serial).dark_share, 0.10);
+}
+
+TEST(Photometric, CountsEveryRow) {
+    Serial serial;
+    const OwnedLuma grey = groundline::test::noise_image(50, 43, 9, 100, 120);
+    for (int bright = 0; bright < 43; ++bright) {
+        OwnedLuma image = grey;
+        for (int x = 0; x < 50; ++x)
+            image.at(x, bright) = 255;
+        EXPECT_DOUBLE_EQ(measure_photometric(image.view(), grey.view(), serial).overexposed_share, 1.0 / 43);
+        EXPECT_DOUBLE_EQ(measure_photometric(grey.view(), image.view(), serial).overexposed_share, 1.0 / 43);
+    }
+}
+
+// Four levels of 25 % each: 5 % lies a fifth into the lowest, 95 % four fifths into the highest.
+TEST(Photometric, QuantilesLieBetweenGreyLevels) {
+    Serial serial;
+    OwnedLuma image(40, 20);
+    image.fill([](int x, int) { return 100 + x / 10; });
+    EXPECT_NEAR(measure_photometric(image.view(), image.view(), serial).contrast, 3.6, 1e-12);
 }
 
 // Against sorting: the contrast is the distance of two order statistics.

@@ -15,7 +15,7 @@ namespace groundline::io {
 // All reading functions throw Refusal(kConfig) with file, line, name and what was expected.
 class YamlField {
   public:
-    // The whole of a file. OpenCV's "%YAML:1.0" first line is accepted, and XML as OpenCV writes it.
+    // The whole of a file: YAML, JSON, or XML as OpenCV writes it.
     explicit YamlField(const SourceText& source);
 
     bool is_map() const { return node_.IsMap(); }
