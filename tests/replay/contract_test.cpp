@@ -76,7 +76,7 @@ TEST(Contract, SameBytesForAnyThreadsAndEveryRun) {
     const Folder folder;
     const std::string scene = "drive?width=320&height=240&focal=250&frames=3&seed=5";
     std::string first;
-    for (const std::string& threads : {"1", "2", "3", "2"}) {
+    for (const char* threads : {"1", "2", "3", "2"}) {
         const Outcome outcome = replay(scene, folder / "out", {"--threads", threads});
         ASSERT_EQ(outcome.status, 0) << outcome.err;
         const std::string all = contents(folder / "out", kTimed);
