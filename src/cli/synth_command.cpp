@@ -125,8 +125,8 @@ ordered_json frame_json(const synth::Renderer& renderer, std::int64_t frame) {
 
 int run_synth(const SynthOptions& options) {
     synth::Scene scene = synth::scene_by_name(options.spec);
-    if (options.frames) scene.frames = *options.frames;
-    if (scene.frames < 1) throw Refusal(ExitStatus::kUsage, "--frames must be at least 1");
+    const std::int64_t frames = options.frames.value_or(scene.frames);
+    if (frames < 1) throw Refusal(ExitStatus::kUsage, "--frames must be at least 1");
     if (!(options.tolerance_m > 0.0)) throw Refusal(ExitStatus::kUsage, "--tolerance-m must be above 0");
     const synth::Renderer renderer(std::move(scene));
     const RectifiedRig& rig = renderer.scene().rig;
@@ -138,20 +138,18 @@ int run_synth(const SynthOptions& options) {
     io::write_file_whole(options.out / "calib.txt", calibration_text(rig));
     ordered_json summary = scene_json(renderer.scene(), options);
     std::int64_t frame = 0;
-    for (; frame < renderer.scene().frames && !stop.load(); ++frame) {
+    for (; frame < frames && !stop.load(); ++frame) {
         renderer.render(frame, pool, images.left, images.left_bgr, images.right);
         renderer.render_truth(frame, pool, options.tolerance_m, images.truth);
         images.encode();
         images.write(options.out, frame);
         summary["frames"].push_back(frame_json(renderer, frame));
-        if ((frame + 1) % 10 == 0)
-            fmt::print(stderr, "{} of {} frames\n", frame + 1, renderer.scene().frames);
+        if ((frame + 1) % 10 == 0) fmt::print(stderr, "{} of {} frames\n", frame + 1, frames);
     }
     io::write_file_whole(options.out / "truth.json", summary.dump(1) + "\n");
     fmt::print("{} frame{} of '{}' with truth in {}\n", frame, frame == 1 ? "" : "s", renderer.scene().name,
                options.out.string());
-    const bool complete = frame == renderer.scene().frames;
-    return static_cast<int>(complete ? ExitStatus::kDone : ExitStatus::kInterrupted);
+    return static_cast<int>(frame == frames ? ExitStatus::kDone : ExitStatus::kInterrupted);
 }
 
 }  // namespace groundline::cli

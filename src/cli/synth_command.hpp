@@ -10,7 +10,7 @@ namespace groundline::cli {
 
 struct SynthOptions {
     std::string spec;                    // NAME[?key=value&...], as after `synthetic:`
-    std::optional<std::int64_t> frames;  // instead of the scene's own number
+    std::optional<std::int64_t> frames;  // instead of the scene's own number; the scene stays the same
     std::filesystem::path out;           // must not exist or be empty
     double tolerance_m = 0.20;           // of the classes
 };
