@@ -12,9 +12,6 @@ namespace groundline::terrain {
 namespace {
 
 constexpr int kUnitsPerPixel = 16;
-constexpr int kShearedBinsPerPx = 2;  // enough to choose among lines; the plane is fitted to pixels
-constexpr int kStepsPerBin = kDisparityOne / kShearedBinsPerPx;
-constexpr double kRollStepDeg = 6.0;  // half of it blurs a row by 3 px at the edge of a VGA picture
 constexpr double kNearPx = 1.0;
 constexpr double kInlierPx = 1.5;
 constexpr double kResidualPx = 3.0;
@@ -27,7 +24,10 @@ constexpr double kSlopeMin = 0.015, kSlopeMax = 1.0;
 
 GroundFinder::GroundFinder(const TerrainConfig& config, const RectifiedRig& rig, int min_disparity,
                            int disparities, Arena& arena)
-    : config_(config), rig_(rig), disparities_(disparities) {
+    : config_(config),
+      rig_(rig),
+      last_disparity_(min_disparity + disparities - 1),
+      disparities_(disparities) {
     if (rig.width < 32 || rig.height < 32)
         throw Refusal(ExitStatus::kConfig, "pictures of " + std::to_string(rig.width) + " x " +
                                                std::to_string(rig.height) +
@@ -46,25 +46,13 @@ GroundFinder::GroundFinder(const TerrainConfig& config, const RectifiedRig& rig,
     centre_u_ = rig.calibrated ? rig.cx_px : 0.5 * rig.width;
     centre_v_ = rig.calibrated ? rig.cy_px : 0.5 * rig.height;
 
-    column_step_ = std::max(1, (rig.width + 160) / 320);
     row_step_ = 2 * std::max(1, (rig.height + 240) / 480);
-    const double steepest =
-        det::tan(det::radians(std::fabs(gate.roll_deg) + gate.roll_max_deg)) * 0.5 * rig.width;
-    pad_rows_ = static_cast<int>(steepest / row_step_) + 2;
-    const int rows = (rig.height + row_step_ - 1) / row_step_ + 2 * pad_rows_;
-    const int bins = disparities * kShearedBinsPerPx + 1;
     line_gate_.slope_min = arena.take<double>(Hough::kMaxHorizons);
     line_gate_.slope_max = arena.take<double>(Hough::kMaxHorizons);
     set_line_gate(config.gate);
-    // From the highest horizon of any gate to the last row of a histogram.
-    const int max_distance =
-        rows + static_cast<int>(std::max(0.0, -line_gate_.horizon_first) / row_step_) + 2;
-    for (std::size_t i = 0; i < kMaxRolls; ++i) {
-        hough_[i].take(arena, max_distance);
-        sheared_[i] = {arena.image<std::uint16_t>(bins, rows), -1.0 * pad_rows_ * row_step_, 1.0 * row_step_,
-                       min_disparity - offset_px_, 1.0 * kShearedBinsPerPx};
-        shifts_[i] = arena.take<std::int32_t>(static_cast<std::size_t>(rig.width));
-    }
+    // From the highest horizon of any gate to the last row.
+    hough_.take(arena,
+                static_cast<int>((rig.height + std::max(0.0, -line_gate_.horizon_first)) / row_step_) + 2);
     plane_fit_.take(arena, rig.width, rig.height);
     tally_ = arena.take<RowTally>(static_cast<std::size_t>(rig.height));
     supported_rows_ = arena.take<std::uint8_t>(static_cast<std::size_t>(rig.height));
@@ -125,72 +113,35 @@ void GroundFinder::set_line_gate(const Gate& gate) {
     }
 }
 
-void GroundFinder::shear(ConstDisparityMap map, double tan_roll, RowHistogram& histogram,
-                         std::span<std::int32_t> shifts) const {
-    const int bins = histogram.cells.width;
-    const int end = (bins - 1) * kStepsPerBin;
-    const int last_row = histogram.cells.height - 1;
-    const int first_q4 =
-        static_cast<int>(std::floor((histogram.first_px + offset_px_) * kDisparityOne + 0.5));
-    for (int i = 0; i <= last_row; ++i)
-        std::fill_n(histogram.cells.row(i), bins, std::uint16_t{0});
-    for (int u = 0; u < map.width(); ++u)
-        shifts[static_cast<std::size_t>(u)] =
-            pad_rows_ + static_cast<int>(std::floor((u - centre_u_) * tan_roll / row_step_ + 0.5));
-    for (int v = 0; v < map.height(); v += row_step_) {
-        const std::int16_t* disparity = map.disparity_q4.row(v);
-        const Invalid* invalid = map.invalid.row(v);
-        const int row = v / row_step_;
-        for (int u = 0; u < map.width(); u += column_step_) {
-            if (invalid[u] != Invalid::kNone) continue;
-            const int above = disparity[u] - first_q4;
-            if (above < 0 || above >= end) continue;
-            const int bin = above / kStepsPerBin;
-            const int target = std::clamp(row + shifts[static_cast<std::size_t>(u)], 0, last_row);
-            std::uint16_t* cells = histogram.cells.row(target) + bin;
-            const int upper = above % kStepsPerBin * (kUnitsPerPixel / kStepsPerBin);
-            cells[0] = static_cast<std::uint16_t>(cells[0] + kUnitsPerPixel - upper);
-            cells[1] = static_cast<std::uint16_t>(cells[1] + upper);
-        }
-    }
-}
+bool GroundFinder::fit(ConstDisparityMap map, const VDisparity& v_disparity, const Gate& gate,
+                       Parallel& parallel, PlaneFitResult& best, double& second_ratio) {
+    // Every row_step_-th row of the v-disparity image, in true disparity.
+    const ImageView<std::uint16_t>& cells = v_disparity.histogram;
+    RowHistogram histogram;
+    histogram.cells = {cells.data, cells.width, (cells.height + row_step_ - 1) / row_step_,
+                       cells.stride * row_step_};
+    histogram.row_step = row_step_;
+    histogram.first_px = v_disparity.first_px - offset_px_;
+    histogram.bins_per_px = v_disparity.bins_per_px;
+    const int cap = std::max(4, map.width() / 16) * kUnitsPerPixel;
+    const HoughResult found = hough_.find(histogram, line_gate_, 2.0 * (disparities_ + 1), cap, config_.line);
 
-bool GroundFinder::fit(ConstDisparityMap map, const Gate& gate, Parallel& parallel, PlaneFitResult& best,
-                       double& second_ratio) {
-    // Roll hypotheses: a v-disparity line is sharp only when the rows are level with the ground.
-    int either_side = 0;
-    if (config_.line == LineMode::kVotes)
-        either_side = std::min(kMaxRolls / 2, static_cast<int>(std::ceil(gate.roll_max_deg / kRollStepDeg)));
-    const int rolls = 2 * either_side + 1;
-    constexpr int kPeaks = HoughResult::kPeaks;
-    constexpr std::size_t kStarts = static_cast<std::size_t>(kMaxRolls) * kPeaks;
-    std::array<double, kMaxRolls> tangent{};
-    std::array<HoughResult, kMaxRolls> found{};
-    for (int i = 0; i < rolls; ++i) {
-        const double away = either_side == 0 ? 0.0 : (i - either_side) * gate.roll_max_deg / either_side;
-        tangent[static_cast<std::size_t>(i)] = det::tan(det::radians(gate.roll_deg + away));
-    }
-    const int cap = std::max(4, map.width() / column_step_ / 16) * kUnitsPerPixel;
-    const double bottom_max_px = 2.0 * (disparities_ + 1);
-    parallel.for_each(rolls, [&](int index, int) {
-        const auto i = static_cast<std::size_t>(index);
-        shear(map, tangent[i], sheared_[i], shifts_[i]);
-        found[i] = hough_[i].find(sheared_[i], line_gate_, bottom_max_px, cap, config_.line);
-    });
-
-    // Each roll's peaks, brought to the plane next to them; votes tell a good roll poorly (a blurred line
-    // still fills its rows), the weight of the pixels on the plane tells it well.
+    // Roll blurs the line, evenly to both sides of where it is in the middle column: each peak is turned by
+    // some rolls about that column and brought to the plane next to it on a thin sample of pixels. The weight
+    // of the pixels on a plane decides.
     plane_fit_.sample(map, offset_px_);
-    std::array<PlaneFitResult, kStarts> planes{};
-    parallel.for_each(rolls * kPeaks, [&](int index, int) {
-        const auto i = static_cast<std::size_t>(index / kPeaks);
-        const auto peak = static_cast<std::size_t>(index % kPeaks);
-        if (index % kPeaks >= found[i].count) return;
-        const Line line = refine_line(sheared_[i], found[i].lines[peak], cap);
+    constexpr int kRolls = 5;
+    const int rolls = config_.line == LineMode::kVotes ? kRolls : 1;
+    std::array<PlaneFitResult, static_cast<std::size_t>(HoughResult::kPeaks) * kRolls> planes{};
+    parallel.for_each(found.count * rolls, [&](int index, int) {
+        const Line line = refine_line(histogram, found.lines[static_cast<std::size_t>(index / rolls)], cap);
+        const double away =
+            rolls == 1 ? 0.0 : gate.roll_max_deg * (index % rolls - kRolls / 2) / (kRolls / 2);
+        const double tangent = det::tan(det::radians(gate.roll_deg + away));
         DisparityPlane start;
-        start.du = line.slope * tangent[i];
+        start.du = line.slope * tangent;
         start.dv = line.slope;
-        start.d0 = -line.slope * (centre_u_ * tangent[i] + line.horizon_row) + offset_px_;
+        start.d0 = -line.slope * (centre_u_ * tangent + line.horizon_row) + offset_px_;
         planes[static_cast<std::size_t>(index)] = plane_fit_.converge(start, 5.0);
     });
     const auto better = [&](const PlaneFitResult& a, const PlaneFitResult& b) {
@@ -279,13 +230,12 @@ int GroundFinder::support_rows(const DisparityPlane& plane) {
     const double share = std::max(0.1, std::min(0.5, 3.0 * chance(kNearPx)));
     const int least = std::max(3, rig_.width / 320);
     const int gap = std::max(2, height / 40);
-    const double last_px = sheared_[0].px_of(sheared_[0].cells.width - 1) + offset_px_;
     int longest = 0;
     int run_start = -1;
     int last_supported = -1;
     for (int v = height - 1; v >= 0; --v) {
         const RowTally& row = tally_[static_cast<std::size_t>(v)];
-        const bool possible = plane.at(centre_u_, v) <= last_px + 1.0;
+        const bool possible = plane.at(centre_u_, v) <= last_disparity_ + 2.0;
         const bool supported = possible && row.near >= least && row.near >= share * row.valid;
         supported_rows_[static_cast<std::size_t>(v)] = supported ? 1 : 0;
         if (!supported) continue;
@@ -357,7 +307,7 @@ void GroundFinder::find(ConstDisparityMap map, VDisparity& v_disparity, Parallel
 
     PlaneFitResult fitted;
     double second_ratio = 0.0;
-    const bool has_plane = fit(map, gate, parallel, fitted, second_ratio);
+    const bool has_plane = fit(map, v_disparity, gate, parallel, fitted, second_ratio);
     // Without a plane the tallies are of the lower half: a plane that is 1 px there and below.
     DisparityPlane plane = fitted.plane;
     if (!has_plane) plane = {0.0, 1.0, 1.0 + offset_px_ - 0.5 * rig_.height};

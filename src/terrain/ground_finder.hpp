@@ -50,14 +50,11 @@ class GroundFinder {
         double weight = 0.0;       // Tukey weights at 3 px
         double residual = 0.0;     // weighted sum
     };
-    static constexpr int kMaxRolls = 7;
 
     Gate gate_for(const GroundPose* prior) const;
     void set_line_gate(const Gate& gate);
-    void shear(ConstDisparityMap map, double tan_roll, RowHistogram& histogram,
-               std::span<std::int32_t> shifts) const;
-    bool fit(ConstDisparityMap map, const Gate& gate, Parallel& parallel, PlaneFitResult& best,
-             double& second_ratio);
+    bool fit(ConstDisparityMap map, const VDisparity& v_disparity, const Gate& gate, Parallel& parallel,
+             PlaneFitResult& best, double& second_ratio);
     void tally(ConstDisparityMap map, const DisparityPlane& plane, Parallel& parallel);
     int support_rows(const DisparityPlane& plane);
     bool inside(const DisparityPlane& plane, const Gate& gate) const;
@@ -67,17 +64,14 @@ class GroundFinder {
 
     TerrainConfig config_;
     RectifiedRig rig_;
+    int last_disparity_;
     int disparities_;
     double offset_px_;  // measured minus true disparity
     double centre_u_;   // where a line's horizon row is meant
     double centre_v_;
-    int column_step_ = 1;  // sampling of the sheared histograms
-    int row_step_ = 2;
-    int pad_rows_ = 0;  // histogram rows above and below the picture that a roll shears into
+    int row_step_ = 2;  // of the rows that vote
     LineGate line_gate_;
-    std::array<Hough, kMaxRolls> hough_;
-    std::array<RowHistogram, kMaxRolls> sheared_;
-    std::array<std::span<std::int32_t>, kMaxRolls> shifts_;
+    Hough hough_;
     PlaneFit plane_fit_;
     std::span<RowTally> tally_;
     std::span<std::uint8_t> supported_rows_;

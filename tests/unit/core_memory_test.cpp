@@ -138,6 +138,12 @@ TEST(LatencyHistogram, HoldsTheExtremes) {
     EXPECT_EQ(histogram.max_ns(), kLargest);
     EXPECT_EQ(histogram.percentile_ns(1.0), kLargest);
     EXPECT_EQ(histogram.percentile_ns(0.25), 0);
+    LatencyHistogram three;  // the median of 1, 2, 3 is the 2nd: ceil(0.5 * 3)
+    for (const std::int64_t value : {1, 2, 3})
+        three.add(value);
+    EXPECT_EQ(three.percentile_ns(0.5), 2);
+    EXPECT_EQ(three.percentile_ns(0.34), 2);
+    EXPECT_EQ(three.percentile_ns(0.33), 1);
     for (std::int64_t small = 0; small < 16; ++small) {
         LatencyHistogram one;
         one.add(small);
