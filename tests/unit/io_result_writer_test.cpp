@@ -261,6 +261,7 @@ TEST(ResultWriter, AnEarlierResultIsReplacedAndStrangersInItStay) {
             ASSERT_TRUE(writer.consume(made.result));
         }
         writer.finish({{"frames", frames}}, true);
+        if (frames == 1) break;
         write_text(out / "mask/my_notes.png", "mine");
         write_text(out / "mask/.000002.png.tmp", "left by a killed run");
     }
@@ -269,7 +270,7 @@ TEST(ResultWriter, AnEarlierResultIsReplacedAndStrangersInItStay) {
     EXPECT_FALSE(fs::exists(out / "mask/000001.png"));
     EXPECT_FALSE(fs::exists(out / "overlay/000002.png"));
     EXPECT_EQ(read_text(out / "mask/my_notes.png"), "mine");
-    fs::remove(out / "mask/.000002.png.tmp");
+    EXPECT_TRUE(testing::temporary_files(out).empty());
     const std::string lines = read_text(out / "frames.jsonl");
     EXPECT_EQ(std::count(lines.begin(), lines.end(), '\n'), 1);
     { ResultWriter(out, counters).begin({}); }
