@@ -10,6 +10,7 @@
 #include "cli/synth_command.hpp"
 #include "core/error.hpp"
 #include "settings/settings.hpp"
+#include "synth/scene.hpp"
 
 namespace {
 
@@ -81,6 +82,7 @@ int main(int argc, char** argv) {
     SynthOptions synth;
     CLI::App* synth_app = app.add_subcommand("synth", "Write a rendered scene with its exact truth");
     synth_app->add_option("scene", synth.spec, "NAME[?seed=N&key=value...]")->required();
+    synth_app->footer(groundline::synth::scene_help());
     synth_app->add_option("--frames", synth.frames, "Pairs to write; default: the scene's own number")
         ->check(CLI::PositiveNumber);
     synth_app->add_option("--out", synth.out, "Folder to write: empty or new")->required();
