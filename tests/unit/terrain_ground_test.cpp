@@ -367,6 +367,24 @@ TEST(GroundFinder, FindsLittleGroundBelowAWallWithRollAndOffset) {
     EXPECT_GE(found_frames, 8);
 }
 
+// A road view: over 1240 px a roll of 10 deg moves the ground by 36 px either way, far beyond the fit's
+// reach. A verge beside the road, 0.15 m high, must not tilt it.
+TEST(GroundFinder, FindsARoadInAWideViewWithRollAndVerge) {
+    RectifiedRig rig = rig_of(1240, 376, 720.0, 0.54);
+    Bench bench(rig, {}, 128);
+    std::uint32_t seed = 1;
+    for (const double roll : {-11.0, -8.0, -3.0, 0.0, 3.0, 8.0, 11.0})
+        for (const bool verge : {false, true}) {
+            World world{rig, pose_deg(2.0, roll, 1.65), {{12.0, 1.0, 1.8, 4.0, 1.5}}};
+            if (verge) world.boxes.push_back({2.0, 6.5, 7.0, 60.0, 0.15});
+            const Found found = bench.find(world, {0.5, 0.3, 0.2, seed++});
+            ASSERT_TRUE(found.ground.found) << roll << " " << verge;
+            EXPECT_LT(pitch_error_deg(found, world), 0.25) << roll << " " << verge;
+            EXPECT_LT(roll_error_deg(found, world), 0.5) << roll << " " << verge;
+            EXPECT_LT(height_error(found, world), 0.03) << roll << " " << verge;
+        }
+}
+
 // Half resolution: f and d halve, the pose stays.
 TEST(GroundG6, HalfResolutionGivesTheSamePose) {
     const RectifiedRig rig = rig_of();
