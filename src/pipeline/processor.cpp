@@ -71,11 +71,12 @@ void Processor::process(const StereoFrame& frame, FrameResult& result) {
     mark_pixels_without_source(result.disparity);
     clock.end(Stage::kMatch);
 
-    ground_finder_.find(result.disparity, result.v_disparity, parallel_, nullptr, evidence.ground_fit,
+    const std::int64_t now_mono_ns = frame.stamp.exposure_mono_ns;
+    ground_finder_.find(result.disparity, result.v_disparity, parallel_,
+                        verdict::search_prior(state_, now_mono_ns, config_.limits), evidence.ground_fit,
                         evidence.ground);
-    const verdict::Decision decision =
-        verdict::decide(evidence, state_, frame.stamp.exposure_mono_ns, config_.limits);
-    state_ = verdict::next_state(decision, state_, frame.stamp.exposure_mono_ns, config_.limits);
+    const verdict::Decision decision = verdict::decide(evidence, state_, now_mono_ns, config_.limits);
+    state_ = verdict::next_state(decision, state_, now_mono_ns, config_.limits);
     result.verdict = decision.verdict;
     result.reasons = decision.reasons;
     result.ground = decision.ground;
