@@ -36,11 +36,11 @@ constexpr Gate gate_of_mount(double height_m, double pitch_deg, double roll_deg)
 }
 
 struct TerrainConfig {
-    double tolerance_up_m = 0.20;    // what the robot drives over
-    double tolerance_down_m = 0.20;  // what it may fall
-    double tolerance_ratio = 0.15;   // of the camera height, up and down, where the rig is not calibrated
-    double clearance_m = 2.0;        // what hangs wholly above this lets the robot pass
-    double stopping_distance_m = 2.0;
+    double tolerance_up_m = 0.20;      // what the robot drives over
+    double tolerance_down_m = 0.20;    // what it may fall
+    double tolerance_ratio = 0.15;     // of the camera height, up and down, where the rig is not calibrated
+    double clearance_m = 2.0;          // what hangs wholly above this lets the robot pass
+    double stopping_distance_m = 2.0;  // what must be known to drive on; for those who judge sectors
     Band band = Band::kOff;
     LineMode line = LineMode::kVotes;
     Gate gate;  // used as it is: whoever knows the mount sets gate_of_mount(...) here
