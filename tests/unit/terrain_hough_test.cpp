@@ -89,6 +89,16 @@ TEST(Hough, PeaksAreDifferentLinesByVotes) {
     expect_line(result.lines[0], strong, 1.5);
     expect_line(result.lines[1], weak, 2.0);
     EXPECT_GT(result.votes[0], result.votes[1]);
+    for (int i = 0; i < result.count; ++i)
+        for (int j = 0; j < i; ++j) {
+            const Line& one = result.lines[static_cast<std::size_t>(i)];
+            const Line& other = result.lines[static_cast<std::size_t>(j)];
+            const double middle = 0.5 * (479.0 + other.horizon_row);
+            EXPECT_GT(std::max(std::fabs(one.at(479.0) - other.at(479.0)),
+                               std::fabs(one.at(middle) - other.at(middle))),
+                      3.0)
+                << i << " " << j;
+        }
 }
 
 TEST(Hough, AWallOutvotesNothingInsideTheGate) {
