@@ -197,6 +197,8 @@ std::vector<Key> make_keys() {
     keys.push_back(whole("stereo.speckle_px", 0, 100000,
                          "With checks: patches with fewer pixels are not believed; 0 is off.",
                          GROUNDLINE_MEMBER(matcher.limits.speckle_px)));
+    keys.push_back(on_off("stereo.median", "With checks: smooth what is left by a 3x3 median.",
+                          GROUNDLINE_MEMBER(matcher.limits.median)));
     keys.push_back(choice<RuleOne>(
         "stereo.rule_one", {{"mean9", RuleOne::kMean9}, {"sum9", RuleOne::kSum9}, {"off", RuleOne::kOff}},
         "Reading of the paper's first rule.", GROUNDLINE_MEMBER(matcher.paper.rule_one)));

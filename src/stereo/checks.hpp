@@ -35,6 +35,8 @@ struct CheckLimits {
     // disparities differ by at most 1 px. 0 switches off. 200 gives 1.3 % at 50.6 % but takes out things of
     // 14x14 px, 100 those of 10x10.
     int speckle_px = 100;
+    // Smooth the answers that are left by median_3x3(). Not a test. Off: it takes out thin things.
+    bool median = false;
 };
 
 }  // namespace groundline::stereo

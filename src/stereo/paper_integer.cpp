@@ -5,6 +5,7 @@
 
 #include "core/arena.hpp"
 #include "stereo/local_mean.hpp"
+#include "stereo/median.hpp"
 #include "stereo/speckle.hpp"
 #include "stereo/subpixel.hpp"
 
@@ -210,6 +211,8 @@ void match_paper_integer(const MatcherConfig& config, ConstLuma left, ConstLuma 
             arena.take<std::int32_t>(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
         remove_speckles(out, limits.speckle_px, patches);
     }
+    if (config.checks && limits.median)
+        median_3x3(out, arena.take<std::int16_t>(2 * static_cast<std::size_t>(width)));
 }
 
 }  // namespace groundline::stereo

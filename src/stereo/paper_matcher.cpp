@@ -6,6 +6,7 @@
 #include <cstdlib>
 
 #include "stereo/local_mean.hpp"
+#include "stereo/median.hpp"
 #include "stereo/paper_kernels.hpp"
 #include "stereo/speckle.hpp"
 #include "stereo/subpixel.hpp"
@@ -92,6 +93,8 @@ PaperMatcher::PaperMatcher(const MatcherConfig& config, int width, int height, i
     if (config.checks && config.limits.speckle_px > 0)
         patches_ =
             arena.take<std::int32_t>(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+    if (config.checks && config.limits.median)
+        median_rows_ = arena.take<std::int16_t>(2 * static_cast<std::size_t>(width));
     state_bytes_ = arena.bytes() - before;
 }
 
@@ -127,6 +130,7 @@ void PaperMatcher::match(ConstLuma left, ConstLuma right, const DisparityMap& ou
         }
     });
     if (!patches_.empty()) remove_speckles(out, config_.limits.speckle_px, patches_);
+    if (!median_rows_.empty()) median_3x3(out, median_rows_);
 }
 
 // Leaves the winners of rows first .. last - 1 in the lane. Disparities pass one at a time; rule 1 needs the

@@ -42,7 +42,8 @@ class PaperMatcher final : public Matcher {
     std::vector<Lane> lanes_;
     Luma plain_left_;  // without local mean; empty when not asked for
     Luma plain_right_;
-    std::span<std::int32_t> patches_;  // one per pixel, for the speckle test
+    std::span<std::int32_t> patches_;      // one per pixel, for the speckle test
+    std::span<std::int16_t> median_rows_;  // two rows, for the median
     std::size_t state_bytes_ = 0;
 };
 

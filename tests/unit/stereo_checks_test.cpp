@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <vector>
 
+#include "stereo/median.hpp"
 #include "stereo/speckle.hpp"
 #include "stereo/subpixel.hpp"
 #include "unit/stereo_test_tools.hpp"
@@ -224,11 +225,44 @@ TEST(StereoChecks, SpecklesAreTheSmallPatchesOfAFloodFill) {
         }
 }
 
+// Sorting all valid neighbours, from a copy of the map.
+TEST(StereoChecks, TheMedianIsOfTheValidNeighboursAsTheyCame) {
+    for (const std::uint32_t seed : {21U, 22U, 23U}) {
+        OwnedResult smoothed(37, 23);
+        OwnedResult given(37, 23);
+        std::mt19937 random(seed);
+        for (int y = 0; y < 23; ++y)
+            for (int x = 0; x < 37; ++x)
+                for (const bool valid = random() % 3 != 0; OwnedResult * result : {&smoothed, &given}) {
+                    result->map.invalid.at(x, y) = valid ? Invalid::kNone : Invalid::kLeftRight;
+                    result->map.disparity_q4.at(x, y) = static_cast<std::int16_t>(
+                        valid ? static_cast<int>((x * 131U + y * 977U + seed * 53U) % 400U) - 100 : 0);
+                }
+        std::vector<std::int16_t> scratch(2 * 37, 77);
+        median_3x3(smoothed.map, scratch);
+        for (int y = 0; y < 23; ++y)
+            for (int x = 0; x < 37; ++x) {
+                ASSERT_EQ(smoothed.reason(x, y), given.reason(x, y));
+                if (given.reason(x, y) != Invalid::kNone) {
+                    ASSERT_EQ(smoothed.map.disparity_q4.at(x, y), 0);
+                    continue;
+                }
+                std::vector<int> valid;
+                for (int v = std::max(y - 1, 0); v <= std::min(y + 1, 22); ++v)
+                    for (int u = std::max(x - 1, 0); u <= std::min(x + 1, 36); ++u)
+                        if (given.reason(u, v) == Invalid::kNone)
+                            valid.push_back(given.map.disparity_q4.at(u, v));
+                std::sort(valid.begin(), valid.end());
+                ASSERT_EQ(smoothed.map.disparity_q4.at(x, y), valid[(valid.size() - 1) / 2]) << x << "," << y;
+            }
+    }
+}
+
 TEST(StereoChecks, EveryLimitCanBeSwitchedOff) {
     const auto left = test::noise_image(150, 60, 209, 0, 255);
     const auto right = test::noise_image(150, 60, 210, 0, 255);
     MatcherConfig config = checked(32);
-    config.limits = {false, 100, 0, 100, -1, 0, -1, 0};
+    config.limits = {false, 100, 0, 100, -1, 0, -1, 0, false};
     const OwnedResult result = match_fast(config, left.view(), right.view());
     EXPECT_EQ(count_reason(result, Invalid::kNone) + count_reason(result, Invalid::kBorder) +
                   count_reason(result, Invalid::kRangeEdge),

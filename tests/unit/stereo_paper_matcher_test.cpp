@@ -52,6 +52,7 @@ TEST(PaperMatcher, C7_EqualsThePlainFormOnPureNoiseAndAtEveryOffset) {
         config.min_disparity = offset;
         config.disparities = 32;
         config.limits.speckle_px = 3;
+        config.limits.median = offset > 0;
         const auto left = test::noise_image(83, 37, 102);
         const auto right = test::noise_image(83, 37, 103);
         EXPECT_EQ(differing_pixels(match_fast(config, left.view(), right.view()),
