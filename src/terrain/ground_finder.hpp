@@ -31,11 +31,10 @@ class GroundFinder {
     // or when frames with it were not believed. Ground::found only if a line was found that enough rows and
     // pixels lie on, its pose is inside the gate and the view is not filled by something upright.
     // Where the rig is not calibrated only the plane is given and metric is false.
-    // Evidence: second_peak_ratio compares what the strongest and the next different ground hold once both
-    // are fitted (raw peaks of one ground differ by less); residual_rms_px is of the pixels within 1.5 px,
-    // 0.87 where they are spread evenly; wall is set where 2 px of disparity hold more pixels below the
-    // horizon than the ground does, or the plane found leans more than 60 deg. Deterministic for any number
-    // of lanes; no allocation.
+    // Evidence: second_peak_ratio is the most that a rival plane inside the gate alone explains, over what
+    // the ground does; residual_rms_px is of the pixels within 1.5 px, 0.87 where they are spread evenly;
+    // wall is set where 2 px of disparity hold more pixels below the horizon than the ground does, or the
+    // plane found leans more than 60 deg. Deterministic for any number of lanes; no allocation.
     void find(ConstDisparityMap map, VDisparity& v_disparity, Parallel& parallel, const GroundPose* prior,
               GroundEvidence& evidence, Ground& ground);
 

@@ -367,6 +367,19 @@ TEST(GroundFinder, FindsLittleGroundBelowAWallWithRollAndOffset) {
     EXPECT_GE(found_frames, 8);
 }
 
+// Half the floor raised by 0.4 m: two grounds as good as each other. A flat floor has no rival, nor has a
+// floor with boxes.
+TEST(GroundFinder, SecondGroundIsSeenAsARival) {
+    const RectifiedRig rig = rig_of();
+    Bench bench(rig);
+    World world{rig, pose_deg(14.0, 0.0, 1.2), {}};
+    EXPECT_LT(bench.find(world, {0.25, 0.05, 0.0, 3}).evidence.second_peak_ratio, 0.2);
+    world.boxes.push_back({4.0, 0.5, 0.6, 0.6, 0.8});
+    EXPECT_LT(bench.find(world, {0.25, 0.05, 0.0, 3}).evidence.second_peak_ratio, 0.3);
+    world.boxes = {{0.5, 10.0, 20.0, 60.0, 0.4}};  // everything to the left
+    EXPECT_GT(bench.find(world, {0.25, 0.05, 0.0, 3}).evidence.second_peak_ratio, 0.6);
+}
+
 // A road view: over 1240 px a roll of 10 deg moves the ground by 36 px either way, far beyond the fit's
 // reach. A verge beside the road, 0.15 m high, must not tilt it.
 TEST(GroundFinder, FindsARoadInAWideViewWithRollAndVerge) {
