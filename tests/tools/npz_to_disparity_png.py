@@ -63,7 +63,7 @@ def main():
     try:
         with zipfile.ZipFile(sys.argv[1]) as archive:
             width, height, values = read_npy(archive.read(archive.namelist()[0]))
-    except (OSError, ValueError, KeyError, IndexError, zipfile.BadZipFile) as problem:
+    except (OSError, ValueError, SyntaxError, KeyError, IndexError, zipfile.BadZipFile) as problem:
         print(f"{sys.argv[1]}: {problem}", file=sys.stderr)
         return 66
     temporary = sys.argv[2] + ".part"
