@@ -45,7 +45,7 @@ struct LineGate {
 
 // The best lines, best first, none nearly the same as another.
 struct HoughResult {
-    static constexpr int kPeaks = 3;
+    static constexpr int kPeaks = 5;
     int count = 0;
     std::array<Line, kPeaks> lines{};
     std::array<double, kPeaks> votes{};
