@@ -77,6 +77,9 @@ void set_word(Settings& settings, std::string_view word) {
 terrain::TerrainConfig terrain_config(const Settings& settings) {
     terrain::TerrainConfig config = settings.terrain;
     const MountSettings& mount = settings.mount;
+    // Whole disparities carry 0.3 px from rounding alone, on top of what the match is off.
+    const bool subpixel = settings.matcher.checks && settings.matcher.limits.subpixel;
+    if (!subpixel) config.sigma_disparity_px = 0.5;
     config.mount_x_m = mount.x_m;
     config.mount_y_m = mount.y_m;
     config.mount_yaw_deg = mount.yaw_deg;

@@ -159,6 +159,16 @@ TEST(Mount, HalfAMountIsRefusedAndAWholeOneNarrowsTheGate) {
     EXPECT_EQ(config.gate.height_max_m, 1.3);
 }
 
+TEST(Terrain, WholeDisparitiesAreTrustedHalfAsMuch) {
+    Settings settings;
+    const double subpixel_px = terrain_config(settings).sigma_disparity_px;
+    for (const char* word : {"stereo.checks=off", "stereo.subpixel=off"}) {
+        Settings whole;
+        set_word(whole, word);
+        EXPECT_EQ(terrain_config(whole).sigma_disparity_px, 2.0 * subpixel_px) << word;
+    }
+}
+
 TEST(EditDistance, CountsInsertionsDeletionsAndSubstitutions) {
     EXPECT_EQ(edit_distance("", ""), 0U);
     EXPECT_EQ(edit_distance("abc", ""), 3U);
