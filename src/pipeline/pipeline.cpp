@@ -139,7 +139,8 @@ void Pipeline::deliver(RunReport& report) {
                     return;
                 }
             }
-            if (slot.stage) report.stages[static_cast<std::size_t>(*slot.stage)].add(now_mono_ns() - begin_ns);
+            if (slot.stage)
+                report.stages[static_cast<std::size_t>(*slot.stage)].add(now_mono_ns() - begin_ns);
         }
         report.latency.add(now_mono_ns() - finished->arrival_mono_ns);
         counters_.add(Count::kResultsDelivered);
