@@ -23,7 +23,7 @@ Pull SyntheticSource::next(StereoFrame& frame) {
     stamp.utime_us = static_cast<std::int64_t>(seconds * 1e6 + 0.5);
     stamp.exposure_mono_ns = static_cast<std::int64_t>(seconds * 1e9 + 0.5);
     stamp.skew_ns = 0;
-    stamp.source = StampSource::kStartOfExposure;
+    stamp.source = StampSource::kFile;
     char name[64];
     std::snprintf(name, sizeof name, "%s %06lld", scene().name.c_str(), static_cast<long long>(position_));
     stamp.set_name(name);

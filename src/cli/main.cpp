@@ -90,8 +90,7 @@ int main(int argc, char** argv) {
         ->check(CLI::Range(0.01, 10.0))
         ->capture_default_str();
 
-    CLI::App* config_app =
-        app.add_subcommand("config", "Print a sample configuration: every key at its default");
+    app.add_subcommand("config", "Print a sample configuration: every key at its default");
 
     try {
         app.parse(argc, argv);
@@ -106,7 +105,7 @@ int main(int argc, char** argv) {
         if (replay_app->parsed()) return run_replay(replay);
         if (evaluate_app->parsed()) return run_evaluate(evaluate);
         if (synth_app->parsed()) return run_synth(synth);
-        fmt::print("{}", groundline::settings::sample_file());
-        return config_app->parsed() ? 0 : static_cast<int>(ExitStatus::kUsage);
+        fmt::print("{}", groundline::settings::sample_file());  // config, the only one left
+        return static_cast<int>(ExitStatus::kDone);
     });
 }

@@ -119,7 +119,9 @@ ExitStatus status_of(const pipeline::RunReport& report, const Counters& counters
 }  // namespace
 
 int run_replay(const ReplayOptions& options) {
-    if (options.loop && !options.out.empty())
+    if (options.out && options.out->empty())
+        throw Refusal(ExitStatus::kUsage, "--out '': expected the name of a folder");
+    if (options.loop && options.out)
         throw Refusal(ExitStatus::kUsage,
                       "--loop with --out would write the same files for ever: leave one of them out");
     const pipeline::RunOptions run = run_options(options);
@@ -139,7 +141,7 @@ int run_replay(const ReplayOptions& options) {
                                          ? rig::Rectifier(*calibration, info.width, info.height, arena)
                                          : rig::Rectifier(info.width, info.height);
     std::optional<io::ResultWriter> writer;
-    if (!options.out.empty()) writer.emplace(options.out, counters);
+    if (options.out) writer.emplace(*options.out, counters);
     const int processors = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
     pipeline::WorkerPool pool(options.threads > 0 ? options.threads : processors);
     pipeline::Processor processor(processor_config(settings, info.colour && writer.has_value()), rectifier,
@@ -161,6 +163,7 @@ int run_replay(const ReplayOptions& options) {
     if (!opened.note.empty()) fmt::print(stderr, "groundline: {}\n", opened.note);
     for (const std::string& warning : rectifier.warnings())
         fmt::print(stderr, "groundline: {}\n", warning);
+    if (publisher && !publisher->tick()) fmt::print(stderr, "groundline: {}\n", publisher->error());
     nlohmann::ordered_json summary = summary_of(facts);
     if (writer) writer->begin(summary);
 
@@ -178,14 +181,22 @@ int run_replay(const ReplayOptions& options) {
     const RunFindings findings{statistics, counters, *report, arena.bytes(),
                                static_cast<double>(now_mono_ns() - begin_ns) * 1e-9};
     const ExitStatus status = status_of(*report, counters);
-    if (publisher && !publisher->error().empty()) fmt::print(stderr, "groundline: {}\n", publisher->error());
+    if (publisher) {
+        publisher->stop();
+        if (publisher->lost() > 0)
+            fmt::print(stderr, "groundline: {} of {} messages were not published: {}\n", publisher->lost(),
+                       publisher->lost() + publisher->sent(), publisher->error());
+    }
     if (writer) {
+        // A paced run skips what it is too slow for: what is written is right, but not all.
+        const bool all =
+            counters.get(Count::kFramesOverwritten) + counters.get(Count::kResultsOverwritten) == 0;
         add_findings(summary, findings);
-        writer->finish(summary, status == ExitStatus::kDone);
+        writer->finish(summary, status == ExitStatus::kDone && all);
     }
     if (!options.quiet) {
         print_end(findings);
-        if (writer) fmt::print("written      {}\n", options.out.string());
+        if (writer) fmt::print("written      {}\n", options.out->string());
     }
     return static_cast<int>(status);
 }

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,7 +14,7 @@ struct ReplayOptions {
     std::vector<std::filesystem::path> calibration;  // empty: looked for beside the source
     std::filesystem::path config;                    // empty: none
     std::vector<std::string> set;                    // key=value
-    std::filesystem::path out;                       // empty: no files
+    std::optional<std::filesystem::path> out;        // no files without
     std::string rate = "max";                        // max, realtime, or pairs a second
     std::int64_t frames = -1;                        // -1: all
     int threads = 0;                                 // 0: one a processor

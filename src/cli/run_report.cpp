@@ -105,6 +105,12 @@ void print_end(const RunFindings& findings) {
                        i == 0 ? "stages      " : "            ", kStageNames[i],
                        milliseconds(stage.percentile_ns(0.50)), milliseconds(stage.percentile_ns(0.99)),
                        milliseconds(stage.max_ns()));
+    if (const LatencyHistogram& latency = findings.report.latency; latency.count() > 0)
+        fmt::print(
+            "latency      p50 {:8.2f}  p99 {:8.2f}  max {:8.2f} ms, from a pair read to its result "
+            "delivered\n",
+            milliseconds(latency.percentile_ns(0.50)), milliseconds(latency.percentile_ns(0.99)),
+            milliseconds(latency.max_ns()));
     fmt::print("memory       {:.1f} MB for frames, taken before the first one\n",
                static_cast<double>(findings.frame_memory_bytes) * 1e-6);
 }
@@ -156,12 +162,16 @@ void add_findings(Json& summary, const RunFindings& findings) {
             {"frames", statistics.heights_m().size()},
             {"median_height_m", rounded(median(statistics.heights_m()), 1e-4)},
             {"median_pitch_deg", rounded(det::degrees(median(statistics.pitches_rad())), 1e-3)}};
+    const auto percentiles = [](const LatencyHistogram& histogram) {
+        return Json{{"p50", milliseconds(histogram.percentile_ns(0.50))},
+                    {"p99", milliseconds(histogram.percentile_ns(0.99))},
+                    {"max", milliseconds(histogram.max_ns())}};
+    };
     Json& stages = summary["stages_ms"] = Json::object();
     for (std::size_t i = 0; i < kStageNames.size(); ++i)
         if (const LatencyHistogram& stage = findings.report.stages[i]; stage.count() > 0)
-            stages[std::string(kStageNames[i])] = {{"p50", milliseconds(stage.percentile_ns(0.50))},
-                                                   {"p99", milliseconds(stage.percentile_ns(0.99))},
-                                                   {"max", milliseconds(stage.max_ns())}};
+            stages[std::string(kStageNames[i])] = percentiles(stage);
+    summary["latency_ms"] = percentiles(findings.report.latency);
     summary["frame_memory_bytes"] = findings.frame_memory_bytes;
 }
 

@@ -43,14 +43,16 @@ enum class Reason : std::uint8_t {
     kEpipolar,        // rows of the two views do not correspond
     kBlurred,         // one camera is out of focus or dirty
     kOverload,        // frames were skipped or shrunk to keep up
+    kUnchecked,       // disparities are answered without checks
     kCount,
 };
 inline constexpr int kReasons = static_cast<int>(Reason::kCount);
 inline constexpr std::array<std::string_view, static_cast<std::size_t>(kReasons)> kReasonNames = {
-    "no_frames",    "uncalibrated", "no_mount_prior", "low_density", "few_inliers",    "short_line",
-    "outside_gate", "pose_jump",    "ambiguous",      "uneven",      "uncertain_pose", "blocked_view",
-    "wall",         "no_ground",    "held_ground",    "photometric", "overexposed",    "dark",
-    "frozen",       "swapped",      "unsynchronised", "epipolar",    "blurred",        "overload"};
+    "no_frames",      "uncalibrated", "no_mount_prior", "low_density", "few_inliers",
+    "short_line",     "outside_gate", "pose_jump",      "ambiguous",   "uneven",
+    "uncertain_pose", "blocked_view", "wall",           "no_ground",   "held_ground",
+    "photometric",    "overexposed",  "dark",           "frozen",      "swapped",
+    "unsynchronised", "epipolar",     "blurred",        "overload",    "unchecked"};
 
 // A set of reasons, as the bit mask that goes out in messages.
 class Reasons {
@@ -97,6 +99,7 @@ struct GroundEvidence {
 struct Evidence {
     bool calibrated = false;
     bool mount_prior = false;
+    bool checked = true;  // disparities passed validity checks; if not, every pixel counts as valid
     PhotometricEvidence photometric;
     GroundEvidence ground_fit;
     Ground ground;

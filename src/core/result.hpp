@@ -48,8 +48,10 @@ struct Sector {
     TerrainClass kind = TerrainClass::kUnknown;  // of the nearest thing
     double nearest_m = 0.0;                      // to it, where blocked
     double nearest_sigma_m = 0.0;
-    double free_range_m = 0.0;  // ground observed without a break, from the near edge of the view
-    double coverage = 0.0;      // share of its pixels below the horizon that are not unknown
+    // Ground seen from the near edge of the view on: it ends with the first stretch of which less than half
+    // was seen as traversable.
+    double free_range_m = 0.0;
+    double coverage = 0.0;  // share of its pixels below the horizon that are not unknown
 };
 inline constexpr std::size_t kMaxSectors = 64;
 

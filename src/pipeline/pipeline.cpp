@@ -57,11 +57,22 @@ Pipeline::~Pipeline() = default;
 
 void Pipeline::run(const RunOptions& options, const std::atomic<bool>& stop, BadPair on_bad,
                    RunReport& report) {
-    std::jthread sinks([&] {
+    // Whatever leaves this function early, nobody may wait for a frame that never comes.
+    struct CloseBoth {
+        Pipeline& pipeline;
+        ~CloseBoth() {
+            pipeline.captured_->close();
+            pipeline.finished_->close();
+        }
+    };
+    std::jthread sinks;
+    std::jthread processing;
+    const CloseBoth close_both{*this};
+    sinks = std::jthread([&] {
         name_this_thread("gl-sinks");
         deliver(report);
     });
-    std::jthread processing([&] {
+    processing = std::jthread([&] {
         name_this_thread("gl-process");
         process(report);
     });
@@ -139,8 +150,10 @@ void Pipeline::deliver(RunReport& report) {
                     return;
                 }
             }
-            if (slot.stage)
-                report.stages[static_cast<std::size_t>(*slot.stage)].add(now_mono_ns() - begin_ns);
+            if (!slot.stage) continue;
+            const auto stage = static_cast<std::size_t>(*slot.stage);
+            finished->result.times_ns[stage] = now_mono_ns() - begin_ns;
+            report.stages[stage].add(finished->result.times_ns[stage]);
         }
         report.latency.add(now_mono_ns() - finished->arrival_mono_ns);
         counters_.add(Count::kResultsDelivered);

@@ -40,7 +40,7 @@ struct SinkSlot {
     bool required = true;
 };
 
-// What a run did. Complete: the source ended by itself and every pair was read.
+// What a run did, beside the counters.
 struct RunReport {
     bool interrupted = false;
     std::string source_error;  // of a source that ended by a failure

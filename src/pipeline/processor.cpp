@@ -7,7 +7,7 @@
 namespace groundline::pipeline {
 namespace {
 
-// Adds the time since it was made, or since the last call, to a stage.
+// Gives each stage the time since the one before it ended.
 class StageClock {
   public:
     explicit StageClock(StageTimes& times) : times_(times), last_ns_(now_mono_ns()) {}

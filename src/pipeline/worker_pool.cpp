@@ -3,18 +3,28 @@
 #include <pthread.h>
 
 #include <string>
+#include <system_error>
 
 namespace groundline::pipeline {
 
 WorkerPool::WorkerPool(int lanes) {
     threads_.reserve(static_cast<std::size_t>(lanes > 1 ? lanes - 1 : 0));
-    for (int lane = 1; lane < lanes; ++lane) {
-        threads_.emplace_back([this, lane] { work(lane); });
-        pthread_setname_np(threads_.back().native_handle(), ("gl-worker" + std::to_string(lane)).c_str());
+    try {
+        for (int lane = 1; lane < lanes; ++lane) {
+            threads_.emplace_back([this, lane] { work(lane); });
+            pthread_setname_np(threads_.back().native_handle(), ("gl-worker" + std::to_string(lane)).c_str());
+        }
+    } catch (const std::system_error& fault) {
+        end();  // those that run already would be waited for without end
+        throw std::system_error(fault.code(), "cannot start " + std::to_string(lanes) + " threads");
     }
 }
 
 WorkerPool::~WorkerPool() {
+    end();
+}
+
+void WorkerPool::end() {
     ending_.store(true, std::memory_order_relaxed);
     job_.fetch_add(1, std::memory_order_release);
     job_.notify_all();

@@ -26,8 +26,8 @@ class WorkerPool final : public Parallel {
 
     void work(int lane);
     void run_share(int lane);
+    void end();
 
-    std::vector<std::jthread> threads_;
     // The job: written by the caller before `job_` changes, read by the workers after.
     const Task* task_ = nullptr;
     int count_ = 0;
@@ -35,6 +35,8 @@ class WorkerPool final : public Parallel {
     alignas(64) std::atomic<std::uint32_t> job_{0};
     alignas(64) std::atomic<std::uint32_t> busy_{0};
     std::atomic<bool> ending_{false};
+    // Last, so that the threads are joined before what they look at ends.
+    std::vector<std::jthread> threads_;
 };
 
 }  // namespace groundline::pipeline

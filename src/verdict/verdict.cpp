@@ -22,7 +22,7 @@ constexpr Reasons kUnusable =
     set_of({Reason::kNoGround, Reason::kWall, Reason::kOutsideGate, Reason::kPoseJump, Reason::kAmbiguous,
             Reason::kFewInliers, Reason::kShortLine});
 constexpr Reasons kInformative = set_of({Reason::kNoMountPrior});
-constexpr Reasons kRemembered = set_of({Reason::kNoMountPrior, Reason::kUncalibrated});
+constexpr Reasons kRemembered = set_of({Reason::kNoMountPrior, Reason::kUncalibrated, Reason::kUnchecked});
 
 constexpr bool within(Reasons reasons, Reasons allowed) {
     return (reasons.bits() & ~allowed.bits()) == 0;
@@ -114,6 +114,7 @@ Decision decide(const Evidence& evidence, const State& state, std::int64_t now_m
     Reasons& reasons = decision.reasons;
     if (!evidence.calibrated) reasons.add(Reason::kUncalibrated);
     if (!evidence.mount_prior) reasons.add(Reason::kNoMountPrior);
+    if (!evidence.checked) reasons.add(Reason::kUnchecked);
     judge_pictures(evidence, limits, reasons);
     judge_ground(evidence, state, fresh, limits, reasons);
 

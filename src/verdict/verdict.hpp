@@ -72,13 +72,15 @@ struct Decision {
 // - Any other reason but kNoMountPrior: it is ground, but thin or seen badly: degraded, on the frame's own.
 // - None of them: trusted; a first frame may be.
 //
+// Without validity checks every pixel has a disparity: density and blocked view say nothing, so kUnchecked.
+//
 // kPoseJump compares with the remembered ground while that is fresh. A stamp before the remembered one means
 // that the source began again: the memory does not count. Worse evidence never gives a better verdict or use.
 // kFrozen, kSwapped, kEpipolar, kBlurred and kOverload are never given: Evidence does not hold them.
 Decision decide(const Evidence& evidence, const State& state, std::int64_t now_mono_ns, const Limits& limits);
 
-// The state after that decision. Remembered is a ground whose only reasons are kNoMountPrior and
-// kUncalibrated.
+// The state after that decision. Remembered is a ground whose only reasons are kNoMountPrior, kUncalibrated
+// and kUnchecked: those are about the set-up, not about this frame.
 State next_state(const Decision& decision, const State& state, std::int64_t now_mono_ns,
                  const Limits& limits);
 

@@ -40,7 +40,7 @@ TEST(SyntheticSource, DeliversThePairsOfTheRendererInOrder) {
         EXPECT_EQ(frame.stamp.utime_us, n * 125000);
         EXPECT_EQ(frame.stamp.exposure_mono_ns, n * 125000000LL);
         EXPECT_EQ(frame.stamp.skew_ns, 0);
-        EXPECT_EQ(frame.stamp.source, StampSource::kStartOfExposure);
+        EXPECT_EQ(frame.stamp.source, StampSource::kFile);
         EXPECT_EQ(frame.stamp.name_view(), "drive 00000" + std::to_string(n));
         studio.shoot(n);
         EXPECT_EQ(synth::test::hash_of(frame.left), synth::test::hash_of(studio.left));
