@@ -179,6 +179,7 @@ TEST(Reasons, AreASetOfStableBits) {
         EXPECT_FALSE(name.empty());
     EXPECT_EQ(kReasonNames[static_cast<std::size_t>(Reason::kHeldGround)], "held_ground");
     EXPECT_EQ(kReasonNames[static_cast<std::size_t>(Reason::kOverload)], "overload");
+    EXPECT_EQ(kReasonNames[static_cast<std::size_t>(Reason::kUnchecked)], "unchecked");
 }
 
 TEST(FrameStamp, CutsLongNamesAndForgetsOldOnes) {

@@ -111,6 +111,7 @@ const std::vector<Rule>& rules() {
     static const std::vector<Rule> table = {
         {"uncalibrated", Reason::kUncalibrated, GroundUse::kWeak, [](E&) {},
          [](E& e) { e.calibrated = e.ground.metric = false; }},
+        {"unchecked", Reason::kUnchecked, GroundUse::kWeak, [](E&) {}, [](E& e) { e.checked = false; }},
         {"density", Reason::kLowDensity, GroundUse::kWeak, [](E& e) { e.ground_fit.density = 0.15; },
          [](E& e) { e.ground_fit.density = below(0.15); }},
         {"density NaN", Reason::kLowDensity, GroundUse::kWeak, [](E&) {},
@@ -345,7 +346,8 @@ TEST(Memory, RemembersOnlyGroundsThatPassedEveryCheck) {
         rule.beyond(evidence);
         Drive run;
         run.step(evidence, 0);
-        EXPECT_EQ(run.state.has_ground, rule.reason == Reason::kUncalibrated);
+        EXPECT_EQ(run.state.has_ground,
+                  rule.reason == Reason::kUncalibrated || rule.reason == Reason::kUnchecked);
     }
     Evidence evidence = good_evidence();
     evidence.mount_prior = false;
@@ -475,6 +477,7 @@ struct Chance {
         e.ground.pose.roll_rad = rad(1.0 + 2.5 * share());
         if (one_in(4)) e.skew_ns = static_cast<std::int64_t>(share() * 4e6);
         if (one_in(8)) e.calibrated = e.ground.metric = false;
+        if (one_in(8)) e.checked = false;
         return e;
     }
     void worsen(Evidence& e) {
@@ -509,6 +512,7 @@ struct Chance {
         if (one_in(4)) e.skew_ns *= 2;
         if (one_in(4)) e.mount_prior = false;
         if (one_in(8)) e.calibrated = e.ground.metric = false;
+        if (one_in(8)) e.checked = false;
     }
 };
 
@@ -545,7 +549,7 @@ TEST(Verdict, TrustAndUseGoTogether) {
         ASSERT_EQ(decision.verdict == Verdict::kBlind, decision.use == GroundUse::kNone);
         ASSERT_EQ(decision.reasons.has(Reason::kHeldGround), decision.use == GroundUse::kHeld);
         ASSERT_EQ(decision.ground.found, decision.use != GroundUse::kNone);
-        if (!evidence.calibrated || evidence.ground_fit.wall) {
+        if (!evidence.calibrated || !evidence.checked || evidence.ground_fit.wall) {
             ASSERT_NE(decision.verdict, Verdict::kTrusted);
         }
         if (decision.verdict != Verdict::kTrusted) {
