@@ -87,7 +87,8 @@ void label_by_class(ConstLuma classes, ConstImageView<std::uint16_t> height_mm, 
         for (int x = 0; x < labels.width; ++x) {
             const std::uint8_t id = classes.at(x, y);
             auto label = id < kTerrainClasses ? static_cast<TerrainClass>(id) : TerrainClass::kUnknown;
-            if (!height_mm.empty() && label_of_height(metres(height_mm.at(x, y))) != label)
+            if (!height_mm.empty() && label != TerrainClass::kDrop &&
+                label_of_height(metres(height_mm.at(x, y))) != label)
                 label = TerrainClass::kUnknown;
             labels.at(x, y) = label;
         }

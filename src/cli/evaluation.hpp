@@ -43,10 +43,11 @@ inline constexpr double kJudgedRange = 30.0;
 // Truth labels: class ids, kUnknown where nothing is judged.
 //
 // From class ids, and from heights (millimetres above the ground + 32768) where that view is not empty:
-// obstacle = class 2 above kObstacleAbove, ground = class 1 within kGroundWithin, drop = class 3 below
-// -kObstacleAbove; without heights the class alone decides.
+// obstacle = class 2 above kObstacleAbove, ground = class 1 within kGroundWithin, drop = class 3 at any
+// height: who drew the scene knows its drops, and a ditch 0.20 m deep is one. Without heights the class alone
+// decides.
 void label_by_class(ConstLuma classes, ConstImageView<std::uint16_t> height_mm, Mask labels);
-// From heights alone: the same limits.
+// From heights alone: the same limits, and drop below -kObstacleAbove.
 void label_by_height(ConstImageView<std::uint16_t> height_mm, Mask labels);
 // From disparities and the ground plane among them, for a calibrated rig: H = h (1 - d_g/d) with disparities
 // without the offset and h from pose_of(plane). No drops: a truth so made is not exact enough below the

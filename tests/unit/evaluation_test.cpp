@@ -122,14 +122,22 @@ TEST(Labels, FromClassesAndHeights) {
                         32768 + 300, 32768 - 301, 32768 - 300, 32768};
     Classes labels(8, 1, kDrop);
     label_by_class(classes.view(), heights.view(), labels.view());
-    EXPECT_EQ(labels.pixels, (std::vector{kUnknown, kTraversable, kUnknown, kObstacle, kUnknown, kDrop,
-                                          kUnknown, kUnknown}));
+    EXPECT_EQ(labels.pixels,
+              (std::vector{kUnknown, kTraversable, kUnknown, kObstacle, kUnknown, kDrop, kDrop, kUnknown}));
     label_by_class(classes.view(), {}, labels.view());
     EXPECT_EQ(labels.pixels, (std::vector{kUnknown, kTraversable, kTraversable, kObstacle, kObstacle, kDrop,
                                           kDrop, kUnknown}));
     label_by_height(heights.view(), labels.view());
     EXPECT_EQ(labels.pixels, (std::vector{kTraversable, kTraversable, kUnknown, kObstacle, kUnknown, kDrop,
                                           kUnknown, kTraversable}));
+}
+
+TEST(Labels, ADropOfTheSceneIsOneHoweverShallow) {
+    Bytes classes{3, 3, 3, 3, 3, 0};
+    Disparities heights{32768 - 200, 32768 - 250, 32768 - 300, 32768 - 1500, 0, 32768 - 1500};
+    Classes labels(6, 1, kObstacle);
+    label_by_class(classes.view(), heights.view(), labels.view());
+    EXPECT_EQ(labels.pixels, (std::vector{kDrop, kDrop, kDrop, kDrop, kDrop, kUnknown}));
 }
 
 TEST(Labels, FromDisparities) {
