@@ -2,8 +2,9 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <cstdio>
 #include <exception>
-#include <functional>
+#include <new>
 
 #include "cli/evaluate_command.hpp"
 #include "cli/replay_command.hpp"
@@ -17,24 +18,13 @@ namespace {
 using groundline::ExitStatus;
 using groundline::Refusal;
 
-// Runs the chosen subcommand; what it refuses or fails at becomes one sentence and an exit status.
-int guarded(const std::function<int()>& command) {
-    try {
-        return command();
-    } catch (const Refusal& refusal) {
-        fmt::print(stderr, "groundline: {}\n", refusal.what());
-        return static_cast<int>(refusal.status());
-    } catch (const std::bad_alloc&) {
-        fmt::print(stderr, "groundline: not enough memory for pictures of this size\n");
-    } catch (const std::exception& failure) {
-        fmt::print(stderr, "groundline: {}\n", failure.what());
-    }
-    return static_cast<int>(ExitStatus::kFailed);
+int fail(ExitStatus status, const char* sentence) {
+    std::fprintf(stderr, "groundline: %s\n", sentence);
+    return static_cast<int>(status);
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+// Parses the command line and runs the chosen subcommand.
+int run(int argc, char** argv) {
     using namespace groundline::cli;
     CLI::App app{
         "Finds the ground line in the v-disparity image of a stereo pair and marks what a robot must "
@@ -101,11 +91,23 @@ int main(int argc, char** argv) {
         return static_cast<int>(ExitStatus::kUsage);
     }
     replay.lcm = replay_app->count("--lcm-url") > 0;
-    return guarded([&] {
-        if (replay_app->parsed()) return run_replay(replay);
-        if (evaluate_app->parsed()) return run_evaluate(evaluate);
-        if (synth_app->parsed()) return run_synth(synth);
-        fmt::print("{}", groundline::settings::sample_file());  // config, the only one left
-        return static_cast<int>(ExitStatus::kDone);
-    });
+    if (replay_app->parsed()) return run_replay(replay);
+    if (evaluate_app->parsed()) return run_evaluate(evaluate);
+    if (synth_app->parsed()) return run_synth(synth);
+    fmt::print("{}", groundline::settings::sample_file());  // config, the only one left
+    return static_cast<int>(ExitStatus::kDone);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    try {
+        return run(argc, argv);
+    } catch (const Refusal& refusal) {
+        return fail(refusal.status(), refusal.what());
+    } catch (const std::bad_alloc&) {
+        return fail(ExitStatus::kFailed, "not enough memory for pictures of this size");
+    } catch (const std::exception& failure) {
+        return fail(ExitStatus::kFailed, failure.what());
+    }
 }

@@ -151,10 +151,7 @@ Key tolerance_key() {
 }
 
 // Written once for const and mutable settings.
-#define GROUNDLINE_MEMBER(path)   \
-    [](auto& settings) -> auto& { \
-        return settings.path;     \
-    }
+#define GROUNDLINE_MEMBER(path) ([](auto& settings) -> auto& { return settings.path; })
 
 std::vector<Key> make_keys() {
     using stereo::MatcherKind;

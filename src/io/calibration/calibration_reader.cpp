@@ -28,6 +28,7 @@ Format format_of(const YamlField& file) {
 
 rig::StereoCalibration read_yaml(const std::vector<SourceText>& sources) {
     std::vector<YamlField> files;
+    files.reserve(sources.size());
     for (const SourceText& source : sources)
         files.emplace_back(source);
     const Format format = format_of(files.front());
@@ -74,6 +75,7 @@ rig::StereoCalibration read_calibration(const std::vector<fs::path>& files, int 
         throw Refusal(ExitStatus::kConfig,
                       fmt::format("calibration: {} files given, expected one or two", files.size()));
     std::vector<SourceText> sources;
+    sources.reserve(files.size());
     for (const fs::path& file : files)
         sources.push_back(load_text(file));
     rig::StereoCalibration calibration = read_any(sources, colour_pair);

@@ -43,8 +43,8 @@ class YamlField {
     [[noreturn]] void refuse(const std::string& what) const;
 
   private:
-    YamlField(std::filesystem::path path, std::string name, YAML::Node node)
-        : path_(std::move(path)), name_(std::move(name)), node_(std::move(node)) {}
+    YamlField(std::filesystem::path path, std::string name, const YAML::Node& node)
+        : path_(std::move(path)), name_(std::move(name)), node_(node) {}
     std::vector<double> shaped(int& rows, int& columns) const;
 
     std::filesystem::path path_;

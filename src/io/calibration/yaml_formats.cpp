@@ -10,7 +10,7 @@ namespace groundline::io {
 namespace {
 
 using rig::transposed;
-using rig::operator*;
+using rig::operator*;  // NOLINT(misc-unused-using-decls): used between matrices
 
 // A rigid motion X -> rotation X + translation.
 struct Motion {
@@ -76,7 +76,7 @@ void set_lens(rig::CameraModel& camera, const std::string& model, const YamlFiel
     if (equidistant && k.size() != 4)
         coefficients.refuse(fmt::format("has {} numbers, expected the 4 of an equidistant lens", k.size()));
     const bool usual =
-        k.size() == 0 || k.size() == 4 || k.size() == 5 || k.size() == 8 || k.size() == 12 || k.size() == 14;
+        k.empty() || k.size() == 4 || k.size() == 5 || k.size() == 8 || k.size() == 12 || k.size() == 14;
     if (!usual) coefficients.refuse(fmt::format("has {} numbers, expected 4, 5 or 8", k.size()));
     if (std::any_of(k.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(k.size(), 8)), k.end(),
                     [](double value) { return value != 0.0; }))
