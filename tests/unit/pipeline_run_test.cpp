@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <mutex>
 #include <thread>
 #include <vector>
 
@@ -68,8 +69,8 @@ class RecordingSink final : public Sink {
         if (delay_ms > 0) std::this_thread::sleep_for(std::chrono::milliseconds(delay_ms));
         if (static_cast<std::int64_t>(positions.size()) == fail_after) return false;
         positions.push_back(result.stamp.position);
-        if (allocations_by_frame.capacity() > allocations_by_frame.size())
-            allocations_by_frame.push_back(test::allocations());
+        if (forbidden_by_frame.capacity() > forbidden_by_frame.size())
+            forbidden_by_frame.emplace_back(test::allocations(), test::mutex_locks());
         std::uint64_t hash = 1469598103934665603ULL;
         const auto mix = [&](std::uint64_t value) { hash = (hash ^ value) * 1099511628211ULL; };
         for (int y = 0; y < result.mask.height; ++y) {
@@ -88,7 +89,7 @@ class RecordingSink final : public Sink {
     std::int64_t fail_after = -1;
     std::vector<std::int64_t> positions;
     std::vector<std::uint64_t> hashes;
-    std::vector<std::uint64_t> allocations_by_frame;
+    std::vector<std::pair<std::uint64_t, std::uint64_t>> forbidden_by_frame;  // allocations and locks so far
 
   private:
     std::string error_ = "the disk is full";
@@ -210,13 +211,30 @@ TEST(Pipeline, LoopsAndHonoursTheFrameLimit) {
     EXPECT_EQ(sink.positions, (std::vector<std::int64_t>{0, 1, 2, 3, 0, 1, 2, 3, 0, 1}));
 }
 
-TEST(Pipeline, SteadyStateAllocatesNothing) {
-    ScriptedSource source(60);
+// On all threads of ours together: capture, processing, workers, sinks.
+TEST(Pipeline, SteadyStateAllocatesAndLocksNothingOver1000Frames) {
+    ScriptedSource source(1003);
     RecordingSink sink;
-    sink.allocations_by_frame.reserve(60);
+    sink.forbidden_by_frame.reserve(1003);
     run_pipeline(source, sink, {}, 3, kNeverStop);
-    ASSERT_EQ(sink.allocations_by_frame.size(), 60U);
-    EXPECT_EQ(sink.allocations_by_frame[59], sink.allocations_by_frame[2]);
+    ASSERT_EQ(sink.forbidden_by_frame.size(), 1003U);
+    EXPECT_EQ(sink.forbidden_by_frame[1002].first, sink.forbidden_by_frame[2].first) << "allocations";
+    EXPECT_EQ(sink.forbidden_by_frame[1002].second, sink.forbidden_by_frame[2].second) << "mutex locks";
+}
+
+// The counters themselves: without this, the test above could pass by counting nothing.
+TEST(Forbidden, AllocationsAndLocksAreSeen) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+    GTEST_SKIP() << "a sanitizer stands in the place of the counters";
+#endif
+    const std::uint64_t allocations = test::allocations();
+    const std::uint64_t locks = test::mutex_locks();
+    delete new volatile int{1};
+    std::mutex mutex;
+    mutex.lock();
+    mutex.unlock();
+    EXPECT_GT(test::allocations(), allocations);
+    EXPECT_GT(test::mutex_locks(), locks);
 }
 
 }  // namespace
