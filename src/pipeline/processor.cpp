@@ -1,5 +1,7 @@
 #include "pipeline/processor.hpp"
 
+#include <algorithm>
+
 #include "core/clock.hpp"
 #include "rig/photometric.hpp"
 #include "terrain/v_disparity.hpp"
@@ -22,6 +24,20 @@ class StageClock {
     std::int64_t last_ns_;
 };
 
+// What lies within `reach` px of a marked pixel, rows and columns alike; empty where nothing is marked.
+ConstImageView<std::uint8_t> widened(ConstImageView<std::uint8_t> marked, int reach, Arena& arena) {
+    if (marked.empty()) return {};
+    const auto result = arena.image<std::uint8_t>(marked.width, marked.height);
+    for (int y = 0; y < marked.height; ++y)
+        for (int x = 0; x < marked.width; ++x) {
+            if (marked.at(x, y) == 0) continue;
+            for (int v = std::max(y - reach, 0); v <= std::min(y + reach, marked.height - 1); ++v)
+                for (int u = std::max(x - reach, 0); u <= std::min(x + reach, marked.width - 1); ++u)
+                    result.at(u, v) = 1;
+        }
+    return result;
+}
+
 }  // namespace
 
 Processor::Processor(const ProcessorConfig& config, const rig::Rectifier& rectifier, Parallel& parallel,
@@ -36,7 +52,9 @@ Processor::Processor(const ProcessorConfig& config, const rig::Rectifier& rectif
       classifier_(config.terrain, rectifier.rig(), matcher_->min_disparity(), matcher_->disparities(), arena),
       sector_finder_(config.terrain, rectifier.rig(), matcher_->min_disparity(), matcher_->disparities(),
                      arena),
-      right_(arena.image<std::uint8_t>(rectifier.rig().width, rectifier.rig().height)) {}
+      right_(arena.image<std::uint8_t>(rectifier.rig().width, rectifier.rig().height)),
+      no_source_left_(widened(rectifier.outside_left(), stereo::kWindowReach, arena)),
+      no_source_right_(widened(rectifier.outside_right(), stereo::kWindowReach, arena)) {}
 
 FrameResult Processor::make_result(Arena& arena) const {
     const RectifiedRig& rig = rectifier_.rig();
@@ -62,6 +80,7 @@ void Processor::process(const StereoFrame& frame, FrameResult& result) {
     Evidence& evidence = result.evidence;
     evidence = {};
     evidence.calibrated = rig.calibrated;
+    evidence.checked = config_.matcher.checks;
     evidence.mount_prior = config_.terrain.mount_known;
     evidence.skew_ns = frame.stamp.skew_ns;
     evidence.photometric = rig::measure_photometric(result.left, right_, parallel_);
@@ -72,8 +91,8 @@ void Processor::process(const StereoFrame& frame, FrameResult& result) {
     clock.end(Stage::kMatch);
 
     const std::int64_t now_mono_ns = frame.stamp.exposure_mono_ns;
-    ground_finder_.find(result.disparity, result.v_disparity, parallel_,
-                        verdict::search_prior(state_, now_mono_ns, config_.limits), evidence.ground_fit,
+    // Without a prior: a ground found wrongly once would narrow the search to itself.
+    ground_finder_.find(result.disparity, result.v_disparity, parallel_, nullptr, evidence.ground_fit,
                         evidence.ground);
     const verdict::Decision decision = verdict::decide(evidence, state_, now_mono_ns, config_.limits);
     state_ = verdict::next_state(decision, state_, now_mono_ns, config_.limits);
@@ -89,10 +108,10 @@ void Processor::process(const StereoFrame& frame, FrameResult& result) {
     clock.end(Stage::kClassify);
 }
 
-// What was matched from or to a pixel that rectification could not fill is no match.
+// What was matched through a window that rectification could not fill is no match.
 void Processor::mark_pixels_without_source(const DisparityMap& map) {
-    const ConstImageView<std::uint8_t> left = rectifier_.outside_left();
-    const ConstImageView<std::uint8_t> right = rectifier_.outside_right();
+    const ConstImageView<std::uint8_t>& left = no_source_left_;
+    const ConstImageView<std::uint8_t>& right = no_source_right_;
     if (left.empty() && right.empty()) return;
     for (int y = 0; y < map.height(); ++y) {
         std::int16_t* disparity = map.disparity_q4.row(y);

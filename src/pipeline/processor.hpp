@@ -52,6 +52,9 @@ class Processor {
     terrain::Classifier classifier_;
     terrain::SectorFinder sector_finder_;
     Luma right_;
+    // 1 where the window of a match would reach beyond the source picture; empty where none does.
+    ConstImageView<std::uint8_t> no_source_left_;
+    ConstImageView<std::uint8_t> no_source_right_;
     verdict::State state_;
 };
 
