@@ -79,6 +79,30 @@ std::vector<GroundPose> true_poses(const io::Truth& truth, const fs::path& folde
     return poses;
 }
 
+// What the run itself used; nothing where it does not say or had no calibration.
+std::optional<RectifiedRig> rig_of_run(const fs::path& path, int width, int height) {
+    std::ifstream file(path);
+    if (!file) return std::nullopt;
+    try {
+        const json summary = json::parse(file);
+        if (!summary.contains("calibration") || summary.at("calibration").is_null()) return std::nullopt;
+        const json& calibration = summary.at("calibration");
+        RectifiedRig rig{width, height, true};
+        rig.focal_px = calibration.at("focal_px").get<double>();
+        rig.cx_px = calibration.at("cx_px").get<double>();
+        rig.cy_px = calibration.at("cy_px").get<double>();
+        rig.cx_right_px = rig.cx_px - calibration.at("disparity_offset_px").get<double>();
+        rig.baseline_m = calibration.at("baseline_m").get<double>();
+        if (!(rig.focal_px > 0.0 && rig.baseline_m > 0.0))
+            throw std::runtime_error("focal_px and baseline_m must be above 0");
+        return rig;
+    } catch (const std::exception& problem) {
+        throw Refusal(ExitStatus::kInput,
+                      fmt::format("cannot use the calibration in '{}': {}; replay again to write it anew",
+                                  path.string(), problem.what()));
+    }
+}
+
 // Numbers of the images in a folder of a result.
 std::set<std::int64_t> numbers_in(const fs::path& folder) {
     std::set<std::int64_t> numbers;
@@ -233,6 +257,8 @@ class Evaluator {
     }
 
     void find_rig(int width, int height) {
+        rig_ = rig_of_run(out_ / "summary.json", width, height);
+        if (rig_) return;
         rig_.emplace();
         const std::vector<fs::path> files = io::find_calibration(truth_folder_);
         if (files.empty()) {

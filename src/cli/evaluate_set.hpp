@@ -29,12 +29,13 @@ struct SetReport {
     std::string pose_truth;  // "truth.json", "disparity truth"; empty: no pose scores
 };
 
-// `truth`: a folder as io::Truth reads it, with its calibration where terrain has to come from disparities;
-// truth.json holds the pose of each frame where it has "frames": [{"pitch_deg", "roll_deg", "height_m"},
-// ...]. `out`: what `groundline replay --out` wrote. The result file numbered N belongs to truth frame N.
-// Where the truth does not say what is occluded and more than half of its pixels have a disparity,
-// mark_occluded() does. Throws Refusal: kInput where a folder or everything in it is missing or unreadable,
-// kConfig for a calibration that is refused. A later frame that cannot be read is counted and remarked on.
+// `truth`: a folder as io::Truth reads it; truth.json holds the pose of each frame where it has "frames":
+// [{"pitch_deg", "roll_deg", "height_m"}, ...]. `out`: what `groundline replay --out` wrote. The result file
+// numbered N belongs to truth frame N. The calibration is the one in out's summary.json, else the one found
+// in `truth`. Where the truth does not say what is occluded and more than half of its pixels have a
+// disparity, mark_occluded() does. Throws Refusal: kInput where a folder or everything in it is missing or
+// unreadable, kConfig for a calibration that is refused. A later frame that cannot be read is counted and
+// remarked on.
 SetReport evaluate_set(const std::filesystem::path& truth, const std::filesystem::path& out);
 
 }  // namespace groundline::cli

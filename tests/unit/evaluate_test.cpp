@@ -234,6 +234,43 @@ TEST_F(Evaluate, BeyondThirtyMetresNothingIsJudged) {
     EXPECT_TRUE(found["terrain"]["ground_known"].is_null());
 }
 
+// With the truth folder's calibration the ground is 45 m away; the run's own says otherwise.
+TEST_F(Evaluate, TheCalibrationOfTheRunGoesBeforeThatOfTheTruth) {
+    make_truth(root_ / "truth");
+    write(root_ / "truth/calib.txt", "P0: 100 0 4 0 0 100 1 0 0 0 1 0\nP1: 100 0 4 -90 0 100 1 0 0 0 1 0\n");
+    make_result(root_ / "out");
+    const auto summary = [](const char* focal, const char* baseline, const char* offset) {
+        return std::string(R"({"calibration":{"file":"x","format":"y","cx_px":4,"cy_px":1,"focal_px":)") +
+               focal + R"(,"baseline_m":)" + baseline + R"(,"disparity_offset_px":)" + offset + "}}";
+    };
+    const struct {
+        std::string text;
+        int ground_pixels;
+    } cases[] = {{summary("100", "0.3", "0"), 16},     // 15 m
+                 {summary("100", "0.3", "1.5"), 0},    // 60 m
+                 {summary("100", "0.9", "-2.0"), 16},  // 22.5 m
+                 {summary("250", "0.3", "0"), 0},      // 37.5 m
+                 {R"({"calibration":null})", 0},      {R"({})", 0}};
+    for (const auto& each : cases) {
+        write(root_ / "out/summary.json", each.text);
+        ASSERT_EQ(run_pair(), 0) << sentence_;
+        const json found = json::parse(out_);
+        EXPECT_EQ(found["terrain"]["ground_pixels"], each.ground_pixels) << each.text;
+        EXPECT_EQ(found["terrain"]["obstacle_pixels"], 8) << each.text;
+    }
+    fs::remove(root_ / "truth/calib.txt");
+    write(root_ / "out/summary.json", summary("100", "0.9", "0"));
+    ASSERT_EQ(run_pair(), 0) << sentence_;
+    EXPECT_EQ(json::parse(out_)["terrain"]["ground_pixels"], 0);
+    for (const std::string& text :
+         {summary("\"long\"", "0.3", "0"), summary("100", "0", "0"), summary("-1", "0.3", "0"),
+          summary("100", "0.3", "null"), std::string(R"({"calibration":{}})"), std::string("{")}) {
+        write(root_ / "out/summary.json", text);
+        EXPECT_EQ(run_pair(), 66) << text;
+        EXPECT_NE(sentence_.find("summary.json"), std::string::npos) << sentence_;
+    }
+}
+
 TEST_F(Evaluate, WithoutClassesAndCalibrationOnlyDisparityIsJudged) {
     make_truth(root_ / "truth", false);
     fs::remove(root_ / "truth/truth.json");
