@@ -277,14 +277,15 @@ PairList list_two_images(const fs::path& left, const fs::path& right) {
     PairList list;
     list.layout = "two images";
     list.pairs.push_back({left, right, 0, 0});
-    // The deepest common folder: right's path must start with it.
-    const fs::path left_folder = fs::absolute(left).lexically_normal().parent_path();
-    const fs::path right_folder = fs::absolute(right).lexically_normal().parent_path();
-    for (auto a = left_folder.begin(), b = right_folder.begin();
-         a != left_folder.end() && b != right_folder.end() && *a == *b; ++a, ++b)
-        list.folder /= *a;
-    if (left.parent_path() == right.parent_path()) list.folder = left.parent_path();
-    if (list.folder.empty()) list.folder = ".";
+    const auto folder_of = [](const fs::path& image) {
+        return fs::absolute(image).lexically_normal().parent_path();
+    };
+    const fs::path left_folder = folder_of(left), right_folder = folder_of(right);
+    if (left_folder == right_folder)
+        list.folder = left.has_parent_path() ? left.parent_path() : ".";
+    else if (left_folder.filename() == "left" && right_folder.filename() == "right" &&
+             left_folder.parent_path() == right_folder.parent_path())
+        list.folder = left_folder.parent_path();
     stamp_by_name(list);
     return list;
 }

@@ -17,7 +17,7 @@ struct PairFiles {
 
 struct PairList {
     std::string layout;            // for people, e.g. "KITTI image_0 and image_1"
-    std::filesystem::path folder;  // where calibration is looked for
+    std::filesystem::path folder;  // where calibration is looked for; empty: nowhere
     bool colour_pair = false;      // KITTI's colour cameras, whose calibration is P2 and P3
     bool stamped = false;          // the stamps come from the data
     std::string note;              // one sentence about images left out, else empty
@@ -33,7 +33,8 @@ struct PairList {
 // Throws Refusal(kInput): nothing known, one side only, names on one side only, malformed stamps.
 PairList list_pairs(const std::filesystem::path& folder);
 
-// A pair given as two files; the folder is the deepest one that holds both.
+// A pair given as two files. The folder is the one that holds both, or the parent of left/ and right/ that
+// hold one each; else it is empty: a calibration found higher up, as in a home folder, may be of another rig.
 PairList list_two_images(const std::filesystem::path& left, const std::filesystem::path& right);
 
 // Names of the image files of a folder, by extension, in the order of list_pairs; hidden files are none.

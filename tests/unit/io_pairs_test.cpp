@@ -117,11 +117,30 @@ TEST(Pairs, TwoImagesAndTheFolderThatHoldsThem) {
     Opened one(folder / "set");
     expect_pair(one, 1, 2);
     EXPECT_EQ(one.frame.stamp.name_view(), "left.png");
-    // In different folders, calibration is looked for in the deepest one above both.
+    // In unrelated folders no calibration is looked for.
     write_ramp(folder / "other/right.png", 8, 6, 3);
     Opened apart({(folder / "set/left.png").string(), (folder / "other/right.png").string()});
     expect_pair(apart, 1, 3);
-    EXPECT_EQ(apart.pairs.folder, folder.path());
+    EXPECT_TRUE(apart.pairs.folder.empty()) << apart.pairs.folder;
+}
+
+TEST(Pairs, TwoImagesOfOneSetShareItsCalibration) {
+    const auto folder_of = [](const char* left, const char* right) {
+        return list_two_images(left, right).folder;
+    };
+    const fs::path here = fs::current_path();
+    EXPECT_EQ(folder_of("/set/a.png", "/set/b.png"), "/set");
+    EXPECT_EQ(folder_of("/set/left/1.png", "/set/right/1.png"), "/set");
+    EXPECT_EQ(folder_of("/set/x/../left/1.png", "/set/right/./1.png"), "/set");
+    EXPECT_EQ(folder_of("l.png", "./r.png"), ".");
+    EXPECT_EQ(folder_of("left/1.png", "right/1.png"), here);
+    EXPECT_EQ(folder_of("/left/1.png", "/right/1.png"), "/") << "siblings, if at the top";
+    EXPECT_EQ(folder_of("/set/left/1.png", "/other/right/1.png"), "");
+    EXPECT_EQ(folder_of("/set/right/1.png", "/set/left/1.png"), "") << "exchanged";
+    EXPECT_EQ(folder_of("/set/a/1.png", "/set/b/1.png"), "");
+    EXPECT_EQ(folder_of("/set/left/1.png", "/set/2.png"), "");
+    EXPECT_EQ(folder_of("/set/left/1.png", "/set/deeper/right/1.png"), "");
+    EXPECT_EQ(folder_of("/a/1.png", "/b/1.png"), "");
 }
 
 TEST(Pairs, Middlebury) {
