@@ -104,7 +104,8 @@ void tint_classes(const FrameResult& result, Image8& to) {
         const std::int16_t* disparity = result.disparity.disparity_q4.row(y);
         const Invalid* invalid = result.disparity.invalid.row(y);
         std::uint8_t* pixel = to.bytes.data() + 3 * static_cast<std::ptrdiff_t>(y) * to.width;
-        // Obstacle pixels without a disparity (holes the classifier closed) take the hue on their left.
+        // Obstacle pixels without a disparity (nearer than the search range: range edge) take the hue on
+        // their left.
         Colour hue = table.front();
         for (int x = 0; x < to.width; ++x, pixel += 3) {
             if (invalid[x] == Invalid::kNone)
