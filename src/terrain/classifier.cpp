@@ -150,12 +150,13 @@ TerrainClass Classifier::beyond_range(const Wedge& wedge, int u, int v, double d
     return stands ? TerrainClass::kObstacle : TerrainClass::kUnknown;
 }
 
-void Classifier::classify_row(ConstDisparityMap map, const Wedge& wedge, GroundUse use, bool supported, int v,
-                              Mask out) const {
+void Classifier::classify_row(ConstDisparityMap map, const Wedge& wedge, GroundUse use, RowSupport support,
+                              int v, Mask out) const {
     const std::int16_t* disparity = map.disparity_q4.row(v);
     const Invalid* invalid = map.invalid.row(v);
     TerrainClass* kinds = out.row(v);
-    const TerrainClass level = use == GroundUse::kOwn || (use == GroundUse::kWeak && supported)
+    const TerrainClass level = (use == GroundUse::kOwn && support != RowSupport::kContradicted) ||
+                                       (use == GroundUse::kWeak && support == RowSupport::kSupported)
                                    ? TerrainClass::kTraversable
                                    : TerrainClass::kUnknown;
     const std::int64_t last_q40 = fixed((last_disparity_ - 1 - wedge.offset_px) * kDisparityOne, 2 * kBits);
@@ -189,7 +190,7 @@ void Classifier::classify_row(ConstDisparityMap map, const Wedge& wedge, GroundU
 }
 
 void Classifier::classify(ConstDisparityMap map, const Ground& ground, GroundUse use,
-                          std::span<const std::uint8_t> supported_rows, Mask out,
+                          std::span<const RowSupport> supported_rows, Mask out,
                           FixedVector<Obstacle, kMaxObstacles>& obstacles, double& range_limit_m,
                           Parallel& parallel) {
     assert(map.width() == rig_.width && map.height() == rig_.height &&
@@ -209,9 +210,9 @@ void Classifier::classify(ConstDisparityMap map, const Ground& ground, GroundUse
     const int tasks = (map.height() + kRowsPerTask - 1) / kRowsPerTask;
     parallel.for_each(tasks, [&](int task, int) {
         for (int v = task * kRowsPerTask; v < std::min(map.height(), (task + 1) * kRowsPerTask); ++v) {
-            const bool supported = static_cast<std::size_t>(v) < supported_rows.size() &&
-                                   supported_rows[static_cast<std::size_t>(v)] != 0;
-            classify_row(map, wedge, use, supported, v, out);
+            const auto row = static_cast<std::size_t>(v);
+            const RowSupport support = row < supported_rows.size() ? supported_rows[row] : RowSupport::kNone;
+            classify_row(map, wedge, use, support, v, out);
         }
     });
 

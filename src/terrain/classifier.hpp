@@ -15,6 +15,7 @@
 #include "core/terrain_class.hpp"
 #include "terrain/components.hpp"
 #include "terrain/config.hpp"
+#include "terrain/row_support.hpp"
 
 namespace groundline::terrain {
 
@@ -23,7 +24,7 @@ enum class GroundUse : std::uint8_t {
     kNone,  // nothing: the whole mask is unknown
     kHeld,  // an earlier frame's: obstacles and drops only, never class 1
     kWeak,  // this frame's, degraded: class 1 only in rows that this frame's own evidence supports
-    kOwn,   // this frame's, trusted
+    kOwn,   // this frame's, trusted: class 1 in all rows but those it contradicts
 };
 
 // Used by one thread, which may lend it lanes. All memory is taken at construction; time is bounded by the
@@ -41,10 +42,11 @@ class Classifier {
     // are obstacles, except where the ground itself is nearer than the search range; other invalid pixels
     // unknown. Then things, 8-connected with |delta d| <= 1 + 0.02 d: too small ones become unknown, those
     // wholly above the clearance become unknown and are listed as overhang, the rest is listed nearest first.
-    // A ground with found == false counts as kNone. `supported_rows` has one entry per row, used for kWeak.
+    // A ground with found == false counts as kNone. `supported_rows` has one entry per row:
+    // contradicted rows are never class 1, others in kWeak only where supported.
     // range_limit_m is the farthest r where class 1 is possible, 0 where it is not or without metres.
     void classify(ConstDisparityMap map, const Ground& ground, GroundUse use,
-                  std::span<const std::uint8_t> supported_rows, Mask out,
+                  std::span<const RowSupport> supported_rows, Mask out,
                   FixedVector<Obstacle, kMaxObstacles>& obstacles, double& range_limit_m, Parallel& parallel);
 
   private:
@@ -52,7 +54,7 @@ class Classifier {
 
     Wedge wedge_of(const Ground& ground) const;
     double certify_columns(const Wedge& wedge);
-    void classify_row(ConstDisparityMap map, const Wedge& wedge, GroundUse use, bool supported, int v,
+    void classify_row(ConstDisparityMap map, const Wedge& wedge, GroundUse use, RowSupport support, int v,
                       Mask out) const;
     TerrainClass beyond_range(const Wedge& wedge, int u, int v, double d_px) const;
 

@@ -16,6 +16,7 @@ constexpr double kNearPx = 1.0;
 constexpr double kInlierPx = 1.5;
 constexpr double kResidualPx = 3.0;
 constexpr int kTallyStep = 2;  // columns; every row is tallied, for its support
+constexpr double kRowOffShare = 0.5;
 // Without calibration: focal length over width and baseline over height of real rigs.
 constexpr double kFocalMin = 0.5, kFocalMax = 1.5;
 constexpr double kSlopeMin = 0.015, kSlopeMax = 1.0;
@@ -55,7 +56,7 @@ GroundFinder::GroundFinder(const TerrainConfig& config, const RectifiedRig& rig,
                 static_cast<int>((rig.height + std::max(0.0, -line_gate_.horizon_first)) / row_step_) + 2);
     plane_fit_.take(arena, rig.width, rig.height);
     tally_ = arena.take<RowTally>(static_cast<std::size_t>(rig.height));
-    supported_rows_ = arena.take<std::uint8_t>(static_cast<std::size_t>(rig.height));
+    supported_rows_ = arena.take<RowSupport>(static_cast<std::size_t>(rig.height));
     column_mass_ = arena.take<std::uint32_t>(static_cast<std::size_t>(disparities) * 4 + 1);
 }
 
@@ -227,27 +228,45 @@ double GroundFinder::chance(double within_px) const {
     return std::min(1.0, 2.0 * within_px / disparities_);
 }
 
-// Marks the rows this frame's own pixels support and returns the length of their longest run.
+// Judges each row by this frame's own pixels and returns the length of the longest run of supported ones,
+// short gaps bridged.
 int GroundFinder::support_rows(const DisparityPlane& plane) {
     const int height = static_cast<int>(tally_.size());
     const double share = std::max(0.1, std::min(0.5, 3.0 * chance(kNearPx)));
     const int least = std::max(3, rig_.width / 320);
     const int gap = std::max(2, height / 40);
+    // Height off the plane, over the camera's, that a level row may have. If no row is farther off than half
+    // the tolerance, no two floors differ by more than the tolerance.
+    const double tolerance = rig_.calibrated ? std::min(config_.tolerance_up_m, config_.tolerance_down_m) /
+                                                   pose_of(plane, rig_).height_m
+                                             : config_.tolerance_ratio;
+    const double off = kRowOffShare * tolerance;
     int longest = 0;
     int run_start = -1;
     int last_supported = -1;
+    int rows_off = 0;
+    bool contradicted = false;
     for (int v = height - 1; v >= 0; --v) {
         const RowTally& row = tally_[static_cast<std::size_t>(v)];
-        const bool possible = plane.at(centre_u_, v) <= last_disparity_ + 2.0;
+        const double ground_px = plane.at(centre_u_, v);
+        const bool possible = ground_px <= last_disparity_ + 2.0;
         const bool supported = possible && row.near >= least && row.near >= share * row.valid;
-        supported_rows_[static_cast<std::size_t>(v)] = supported ? 1 : 0;
-        if (!supported) continue;
-        if (run_start < 0 || last_supported - v > gap + 1) {
-            run_start = v;
-        } else {
-            for (int between = v + 1; between < last_supported; ++between)
-                supported_rows_[static_cast<std::size_t>(between)] = 1;
+        // Residuals are of pixels within reach of the plane; their mean is the plane's own error there.
+        const bool is_off = row.weight >= least && row.weight >= share * row.valid &&
+                            std::fabs(row.residual) > off * row.weight * (ground_px - offset_px_);
+        rows_off = is_off ? rows_off + 1 : 0;
+        if (rows_off > gap && !contradicted) {
+            contradicted = true;
+            // Nearer rows, where roll mixes both floors, hide it in their mean.
+            const int mixed = std::min(height - 1, v + 2 * gap);
+            std::fill(supported_rows_.begin() + v, supported_rows_.begin() + mixed + 1,
+                      RowSupport::kContradicted);
         }
+        supported_rows_[static_cast<std::size_t>(v)] = contradicted || is_off ? RowSupport::kContradicted
+                                                       : supported            ? RowSupport::kSupported
+                                                                              : RowSupport::kNone;
+        if (!supported) continue;
+        if (run_start < 0 || last_supported - v > gap + 1) run_start = v;
         last_supported = v;
         longest = std::max(longest, run_start - v + 1);
     }
@@ -343,7 +362,7 @@ void GroundFinder::find(ConstDisparityMap map, VDisparity& v_disparity, Parallel
     evidence.blocked_share = blocked * kTallyStep / (1.0 * map.width() * (height - lower_third));
     const double upright = upright_mass(v_disparity, first_below);
     if (!has_plane) {
-        std::fill(supported_rows_.begin(), supported_rows_.end(), std::uint8_t{0});
+        std::fill(supported_rows_.begin(), supported_rows_.end(), RowSupport::kNone);
         evidence.wall = valid > 0 && upright > 0.5 * kTallyStep * valid;
         return;
     }
@@ -360,7 +379,7 @@ void GroundFinder::find(ConstDisparityMap map, VDisparity& v_disparity, Parallel
     evidence.line_found = evidence.inlier_share >= least_share && evidence.line_run_share >= 0.1;
     ground.found = evidence.line_found && evidence.inside_gate && !evidence.wall;
     if (!ground.found) {
-        std::fill(supported_rows_.begin(), supported_rows_.end(), std::uint8_t{0});
+        std::fill(supported_rows_.begin(), supported_rows_.end(), RowSupport::kNone);
         return;
     }
     ground.plane = plane;

@@ -15,6 +15,7 @@
 #include "terrain/config.hpp"
 #include "terrain/hough.hpp"
 #include "terrain/plane_fit.hpp"
+#include "terrain/row_support.hpp"
 
 namespace groundline::terrain {
 
@@ -38,10 +39,12 @@ class GroundFinder {
     void find(ConstDisparityMap map, VDisparity& v_disparity, Parallel& parallel, const GroundPose* prior,
               GroundEvidence& evidence, Ground& ground);
 
-    // Per image row of the last frame, 1 where its own pixels lie on the ground found: at least a tenth of
-    // the valid ones and three times what chance would put there, within 1 px, or the row is in a gap of at
-    // most a fortieth of the rows between such rows. All 0 where no ground was found.
-    std::span<const std::uint8_t> supported_rows() const { return supported_rows_; }
+    // Per image row of the last frame. Supported: at least a tenth of the valid pixels and three times what
+    // chance would put there lie within 1 px of the ground found. Contradicted: the mean height of the pixels
+    // about the ground is off by more than half the tolerance, or was so in more than a fortieth of the rows
+    // on end nearer by or just beyond: then one plane lies between two floors and what is farther may be on
+    // the other. None everywhere where no ground was found.
+    std::span<const RowSupport> supported_rows() const { return supported_rows_; }
 
   private:
     struct RowTally {
@@ -78,7 +81,7 @@ class GroundFinder {
     Hough hough_;
     PlaneFit plane_fit_;
     std::span<RowTally> tally_;
-    std::span<std::uint8_t> supported_rows_;
+    std::span<RowSupport> supported_rows_;
     std::span<std::uint32_t> column_mass_;
 };
 

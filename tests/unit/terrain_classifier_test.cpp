@@ -36,7 +36,7 @@ struct Bench {
     Classifier classifier;
     DisparityMap map;
     ImageView<TerrainClass> mask;
-    std::vector<std::uint8_t> supported;
+    std::vector<RowSupport> supported;
     FixedVector<Obstacle, kMaxObstacles> obstacles;
     double range_limit_m = -1.0;
 
@@ -45,7 +45,7 @@ struct Bench {
           classifier(config, rig, 0, disparities, arena),
           map(DisparityMap::make(arena, rig.width, rig.height)),
           mask(arena.image<TerrainClass>(rig.width, rig.height)),
-          supported(static_cast<std::size_t>(rig.height), 1) {}
+          supported(static_cast<std::size_t>(rig.height), RowSupport::kSupported) {}
     void classify(const Ground& ground, GroundUse use = GroundUse::kOwn) {
         Serial serial;
         classifier.classify(map, ground, use, supported, mask, obstacles, range_limit_m, serial);
@@ -287,7 +287,8 @@ TEST(Classifier, WhatTheGroundIsWorthDecidesWhatMayBeTraversable) {
     EXPECT_EQ(bench.range_limit_m, 0.0);
 
     for (int v = 0; v < rig.height; ++v)
-        bench.supported[static_cast<std::size_t>(v)] = v % 3 == 0 ? 1 : 0;
+        bench.supported[static_cast<std::size_t>(v)] =
+            v % 3 == 0 ? RowSupport::kSupported : RowSupport::kNone;
     bench.classify(ground, GroundUse::kWeak);
     const std::vector<TerrainClass> weak = bench.pixels();
     for (int v = 0; v < rig.height; ++v)
@@ -296,6 +297,16 @@ TEST(Classifier, WhatTheGroundIsWorthDecidesWhatMayBeTraversable) {
             const bool hidden = own[at] == TerrainClass::kTraversable && v % 3 != 0;
             EXPECT_EQ(weak[at], hidden ? TerrainClass::kUnknown : own[at]);
         }
+
+    bench.classify(ground, GroundUse::kOwn);
+    EXPECT_EQ(bench.pixels(), own);
+    bench.supported.assign(bench.supported.size(), RowSupport::kContradicted);
+    for (const GroundUse use : {GroundUse::kOwn, GroundUse::kWeak}) {
+        bench.classify(ground, use);
+        EXPECT_EQ(bench.count(TerrainClass::kTraversable), 0);
+        EXPECT_EQ(bench.count(TerrainClass::kObstacle), obstacles);
+        EXPECT_EQ(bench.count(TerrainClass::kDrop), drops);
+    }
 
     bench.classify(ground, GroundUse::kNone);
     EXPECT_EQ(bench.count(TerrainClass::kUnknown), rig.width * rig.height);
@@ -565,6 +576,44 @@ TEST(Terrain, AllocatesNothingPerFrame) {
         EXPECT_EQ(test::allocations(), before) << kind;
         EXPECT_EQ(ground.found, kind != 2);
     }
+}
+
+// One plane settles between the floors above and below a step of 0.3 m: the lower floor, deeper than the
+// tolerance, must not come out traversable because the plane is near it.
+TEST(ClassifierStep, FloorBelowAStepIsNotTraversable) {
+    const RectifiedRig rig = rig_of();
+    for (const double step_m : {3.5, 5.0, 6.0})
+        for (const double depth_m : {0.27, 0.30, 0.36}) {
+            Bench bench(rig);
+            Arena arena;
+            GroundFinder finder({}, rig, 0, kDisparities, arena);
+            VDisparity v_disparity = make_v_disparity(arena, rig.height, 0, kDisparities);
+            World world{rig, pose_deg(10.0, 1.0, 1.2), {}};
+            world.ditch_from_m = step_m;
+            world.ditch_to_m = 1e6;
+            world.ditch_depth_m = depth_m;
+            test::render(world, 0, kDisparities, {0.25, 0.03, 0.0, 5}, bench.map);
+            Serial serial;
+            GroundEvidence evidence;
+            Ground ground;
+            finder.find(bench.map, v_disparity, serial, nullptr, evidence, ground);
+            ASSERT_TRUE(ground.found);
+            bench.supported.assign(finder.supported_rows().begin(), finder.supported_rows().end());
+            const test::Rays rays(world);
+            for (const GroundUse use : {GroundUse::kOwn, GroundUse::kWeak}) {
+                bench.classify(ground, use);
+                int lower = 0;
+                int free = 0;
+                for (int v = 0; v < rig.height; ++v)
+                    for (int u = 0; u < rig.width; ++u) {
+                        if (rays.cast(u, v).height_m > -0.25) continue;
+                        ++lower;
+                        free += bench.mask.at(u, v) == TerrainClass::kTraversable ? 1 : 0;
+                    }
+                EXPECT_GT(lower, 20000);
+                EXPECT_LT(free, 0.01 * lower) << step_m << " m away, " << depth_m << " m deep, " << free;
+            }
+        }
 }
 
 }  // namespace

@@ -22,7 +22,7 @@ constexpr int kDisparities = 96;
 struct Found {
     GroundEvidence evidence;
     Ground ground;
-    std::vector<std::uint8_t> supported;
+    std::vector<RowSupport> supported;
 };
 
 class Bench {
@@ -206,8 +206,8 @@ TEST(GroundV3, PoseDoesNotDependOnWhereBoxesStand) {
 void expect_no_ground(const Found& found) {
     EXPECT_FALSE(found.ground.found);
     EXPECT_FALSE(found.ground.metric);
-    for (const std::uint8_t row : found.supported)
-        EXPECT_EQ(row, 0);
+    for (const RowSupport row : found.supported)
+        EXPECT_EQ(row, RowSupport::kNone);
     for (const double value : found.ground.covariance)
         EXPECT_EQ(value, 0.0);
 }
@@ -527,11 +527,11 @@ TEST(GroundFinder, SupportedRowsAreThoseWhereGroundIsSeen) {
     ASSERT_TRUE(found.ground.found);
     const double horizon = rig.cy_px - rig.focal_px * std::tan(world.pose.pitch_rad);
     for (int v = 0; v < static_cast<int>(horizon); ++v)
-        EXPECT_EQ(found.supported[static_cast<std::size_t>(v)], 0) << v;
+        EXPECT_EQ(found.supported[static_cast<std::size_t>(v)], RowSupport::kNone) << v;
     for (int v = 300; v < 360; ++v)
-        EXPECT_EQ(found.supported[static_cast<std::size_t>(v)], 0) << v;
+        EXPECT_EQ(found.supported[static_cast<std::size_t>(v)], RowSupport::kNone) << v;
     for (int v = 365; v < rig.height; ++v)
-        EXPECT_EQ(found.supported[static_cast<std::size_t>(v)], 1) << v;
+        EXPECT_EQ(found.supported[static_cast<std::size_t>(v)], RowSupport::kSupported) << v;
     EXPECT_LT(found.evidence.line_run_share, 0.7);
 }
 

@@ -41,7 +41,7 @@ struct Bench {
         ground.plane = plane_of(world.pose, rig);
         ground.pose = world.pose;
         FixedVector<Obstacle, kMaxObstacles> obstacles;
-        const std::vector<std::uint8_t> supported(static_cast<std::size_t>(rig.height), 1);
+        const std::vector<RowSupport> supported(static_cast<std::size_t>(rig.height), RowSupport::kSupported);
         Serial serial;
         classifier.classify(map, ground, GroundUse::kOwn, supported, mask, obstacles, range_limit_m, serial);
         finder.find(map, ground, mask, sectors);
