@@ -142,12 +142,6 @@ State next_state(const Decision& decision, const State& state, std::int64_t now_
     return next;
 }
 
-const GroundPose* search_prior(const State& state, std::int64_t now_mono_ns, const Limits& limits) {
-    const bool usable =
-        is_fresh(state, now_mono_ns, limits) && state.frames_since == 0 && state.ground.metric;
-    return usable ? &state.ground.pose : nullptr;
-}
-
 Decision decide_without_frames() {
     Decision decision;
     decision.reasons.add(Reason::kNoFrames);

@@ -84,10 +84,6 @@ Decision decide(const Evidence& evidence, const State& state, std::int64_t now_m
 State next_state(const Decision& decision, const State& state, std::int64_t now_mono_ns,
                  const Limits& limits);
 
-// The pose about which to search the next ground, nullptr for the whole gate: only a ground that the frame
-// just before this one saw and that passed every check may narrow the search. Points into `state`.
-const GroundPose* search_prior(const State& state, std::int64_t now_mono_ns, const Limits& limits);
-
 // The decision while no pairs arrive: blind, kNoFrames.
 Decision decide_without_frames();
 

@@ -427,20 +427,6 @@ TEST(Memory, TimeGoingBackwardsStartsAnew) {
     EXPECT_EQ(run.state.ground.pose.pitch_rad, rad(30.0));
 }
 
-TEST(Memory, OnlyTheFrameJustBeforeNarrowsTheSearch) {
-    State state = remembering(12.0, 1000 * kMs);
-    EXPECT_EQ(search_prior(State(), 0, kLimits), nullptr);
-    ASSERT_EQ(search_prior(state, 1033 * kMs, kLimits), &state.ground.pose);
-    EXPECT_NE(search_prior(state, 2000 * kMs, kLimits), nullptr);
-    EXPECT_EQ(search_prior(state, 2000 * kMs + 1, kLimits), nullptr);
-    EXPECT_EQ(search_prior(state, 999 * kMs, kLimits), nullptr);
-    state.frames_since = 1;
-    EXPECT_EQ(search_prior(state, 1033 * kMs, kLimits), nullptr);
-    state.frames_since = 0;
-    state.ground.metric = false;
-    EXPECT_EQ(search_prior(state, 1033 * kMs, kLimits), nullptr);
-}
-
 // Random evidence near the limits, and a change for the worse of a random part of it.
 struct Chance {
     std::mt19937 random;
