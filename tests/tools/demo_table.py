@@ -9,7 +9,8 @@ import pathlib
 import statistics
 import sys
 
-HEAD = ("set", "frames", "trusted", "degraded", "blind", "ground m", "answered", "bad-3", "obstacles", "shown free")
+HEAD = ("set", "frames", "trusted", "degraded", "blind", "ground m", "answered", "bad-3", "obstacles", "free", "drops",
+        "free")
 
 
 def percent(value):
@@ -31,7 +32,8 @@ def row(results, evaluations, name):
     return (name, str(len(frames)), str(verdicts["trusted"]), str(verdicts["degraded"]), str(verdicts["blind"]),
             f"{statistics.median(heights):.2f}" if heights else "-", percent(disparity.get("density")),
             percent(disparity.get("bad3")), percent(terrain.get("obstacle_recall")),
-            percent(terrain.get("obstacle_called_free")))
+            percent(terrain.get("obstacle_called_free")), percent(terrain.get("drop_recall")),
+            percent(terrain.get("drop_called_free")))
 
 
 def main():
@@ -42,8 +44,8 @@ def main():
         print("  ".join(text.ljust(width) if column == 0 else text.rjust(width)
                         for column, (text, width) in enumerate(zip(line, widths))))
     print("\nverdicts and ground height (median) of all frames; against the truth, where there is one: share of its\n"
-          "pixels with a disparity, share of those off by more than 3 px, share of obstacle pixels found, and shown\n"
-          "as traversable")
+          "pixels with a disparity, share of those off by more than 3 px, share of obstacle pixels found, and\n"
+          "shown as traversable (free), and the same of pixels of drops")
 
 
 if __name__ == "__main__":
