@@ -34,8 +34,9 @@ inline double reach_px(double tolerance_px, double ground_px) {
 // Covariance: neighbouring pixels share their matching errors, so counting them as independent would
 // understate it by a factor of 5 to 30. Residuals are summed over tiles of 32 x 32 px, which do not share
 // them, and the covariance is the sandwich A^-1 (sum of score score') A^-1 of those sums, plus the same with
-// strips of 32 whole rows for errors that run along rows (rounding to whole disparities), plus 0.05 px common
-// to all pixels that no statistic of one frame can see.
+// strips of 32 whole rows for errors that run along rows (rounding to whole disparities), plus what no
+// statistic of one frame can see: 0.08 px common to all pixels, and growing evenly from the middle of the
+// picture to its border 0.06 px along v and 0.02 px along u.
 class PlaneFit {
   public:
     void take(Arena& arena, int width, int height);

@@ -455,6 +455,27 @@ TEST(GroundFinder, SigmasCoverTheErrorsOfCorrelatedNoise) {
     EXPECT_LT(sum_squares / kTrials, 2.0);
 }
 
+// Matching windows make errors that grow down the picture; nothing in one frame tells them from a pose.
+TEST(GroundFinder, SigmasCoverAnErrorThatGrowsDownThePicture) {
+    const RectifiedRig rig = rig_of();
+    Bench bench(rig);
+    const World world{rig, pose_deg(12.0, 1.0, 1.2), {}};
+    for (const double border_px : {-0.1, 0.1}) {
+        test::render(world, 0, kDisparities, {0.25, 0.0, 0.0, 7}, bench.map);
+        for (int v = 0; v < rig.height; ++v)
+            for (int u = 0; u < rig.width; ++u) {
+                const double error_px = border_px * (v / rig.cy_px - 1.0);
+                auto& d_q4 = bench.map.disparity_q4.at(u, v);
+                d_q4 = static_cast<std::int16_t>(std::max(0.0, std::floor(d_q4 + 16.0 * error_px + 0.5)));
+            }
+        const Found found = bench.find();
+        ASSERT_TRUE(found.ground.found);
+        EXPECT_LT(std::fabs(found.ground.pose.height_m - 1.2), 2.0 * found.ground.sigma.height_m);
+        EXPECT_LT(std::fabs(found.ground.pose.pitch_rad - world.pose.pitch_rad),
+                  2.0 * found.ground.sigma.pitch_rad);
+    }
+}
+
 TEST(GroundFinder, LongestSegmentModeFindsTheGroundToo) {
     const RectifiedRig rig = rig_of();
     TerrainConfig config;
