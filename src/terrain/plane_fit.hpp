@@ -35,8 +35,8 @@ inline double reach_px(double tolerance_px, double ground_px) {
 // understate it by a factor of 5 to 30. Residuals are summed over tiles of 32 x 32 px, which do not share
 // them, and the covariance is the sandwich A^-1 (sum of score score') A^-1 of those sums, plus the same with
 // strips of 32 whole rows for errors that run along rows (rounding to whole disparities), plus what no
-// statistic of one frame can see: 0.08 px common to all pixels, and growing evenly from the middle of the
-// picture to its border 0.06 px along v and 0.02 px along u.
+// statistic of one frame can see: 0.09 px common to all pixels, and growing evenly from the middle of the
+// picture to its border 0.08 px along v and 0.02 px along u.
 class PlaneFit {
   public:
     void take(Arena& arena, int width, int height);

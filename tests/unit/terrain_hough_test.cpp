@@ -182,7 +182,9 @@ TEST(PlaneFit, CovarianceCoversErrorsThatNeighboursShare) {
         const PlaneFitResult result = fit.fit(map, rough.plane, serial);
         ASSERT_TRUE(result.found);
         const double x[3] = {160.0, 230.0, 1.0};
-        double variance = -0.05 * 0.05;
+        // Without the fixed terms, common and along v, which are not what this is about.
+        const double tilt_px = 0.08 * (230.0 - 120.0) / 120.0;
+        double variance = -(0.09 * 0.09 + tilt_px * tilt_px);
         for (std::size_t i = 0; i < 3; ++i)
             for (std::size_t j = 0; j < 3; ++j)
                 variance += x[i] * result.covariance[3 * i + j] * x[j];
