@@ -13,7 +13,7 @@
 namespace groundline::io {
 
 // All reading functions throw Refusal(kConfig) with file, line, name and what was expected.
-class YamlField {
+class YamlField {  // NOLINT(bugprone-exception-escape): yaml-cpp does not declare its moves noexcept
   public:
     // The whole of a file: YAML, JSON, or XML as OpenCV writes it.
     explicit YamlField(const SourceText& source);
