@@ -216,7 +216,8 @@ void Components::list(ConstDisparityMap map, const ThingRules& rules, Mask mask,
                 seen += bins[bin];
                 if (seen >= rank) break;
             }
-            return first_px + (bin + 0.5 - 0.5 / (kDisparityOne / kBinsPerPx)) / kBinsPerPx;
+            constexpr int kStepsPerBin = kDisparityOne / kBinsPerPx;
+            return first_px + (bin + 0.5 - 0.5 / kStepsPerBin) / kBinsPerPx;
         };
         const std::int64_t pixels = things[i].pixels;
         things[i].median_px = disparity_at((pixels + 1) / 2);

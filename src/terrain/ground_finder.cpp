@@ -139,8 +139,8 @@ bool GroundFinder::fit(ConstDisparityMap map, const VDisparity& v_disparity, con
     const int peaks = std::min(found.count, rig_.calibrated ? 3 : 5);
     parallel.for_each(peaks * rolls, [&](int index, int) {
         const Line line = refine_line(histogram, found.lines[static_cast<std::size_t>(index / rolls)], cap);
-        const double away =
-            rolls == 1 ? 0.0 : gate.roll_max_deg * (index % rolls - kRolls / 2) / (kRolls / 2);
+        constexpr int kMiddle = kRolls / 2;
+        const double away = rolls == 1 ? 0.0 : gate.roll_max_deg * (index % rolls - kMiddle) / kMiddle;
         const double tangent = det::tan(det::radians(gate.roll_deg + away));
         DisparityPlane start;
         start.du = line.slope * tangent;
