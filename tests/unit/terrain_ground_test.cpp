@@ -203,6 +203,25 @@ TEST(GroundV3, PoseDoesNotDependOnWhereBoxesStand) {
     EXPECT_GT(largest_share, 33);  // the trials do hide a good part of the ground
 }
 
+// A short gap does not break the run of the line, but rows without pixels of their own support nothing.
+TEST(GroundFinder, RowsWithoutPixelsOfTheirOwnAreNotSupported) {
+    const RectifiedRig rig = rig_of();
+    Bench bench(rig);
+    const World world{rig, pose_deg(12.0, 0.0, 1.0), {}};
+    test::render(world, 0, 96, {0.25, 0.05, 0.0, 9}, bench.map);
+    const double whole = bench.find().evidence.line_run_share;
+    for (int v = 300; v < 305; ++v)
+        for (int u = 0; u < rig.width; ++u) {
+            bench.map.disparity_q4.at(u, v) = 0;
+            bench.map.invalid.at(u, v) = Invalid::kTexture;
+        }
+    const Found found = bench.find();
+    ASSERT_TRUE(found.ground.found);
+    EXPECT_EQ(found.evidence.line_run_share, whole);
+    for (std::size_t v = 295; v < 310; ++v)
+        EXPECT_EQ(found.supported[v], v >= 300 && v < 305 ? RowSupport::kNone : RowSupport::kSupported) << v;
+}
+
 void expect_no_ground(const Found& found) {
     EXPECT_FALSE(found.ground.found);
     EXPECT_FALSE(found.ground.metric);
