@@ -207,9 +207,8 @@ void match_paper_integer(const MatcherConfig& config, ConstLuma left, ConstLuma 
             out.invalid.at(x, y) = invalid;
         }
     if (config.checks && limits.speckle_px > 0) {
-        const auto patches =
-            arena.take<std::int32_t>(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
-        remove_speckles(out, limits.speckle_px, patches);
+        SpeckleScratch scratch(width, arena);
+        remove_speckles(out, limits.speckle_px, scratch);
     }
     if (config.checks && limits.median)
         median_3x3(out, arena.take<std::int16_t>(2 * static_cast<std::size_t>(width)));

@@ -8,7 +8,6 @@
 #include "stereo/local_mean.hpp"
 #include "stereo/median.hpp"
 #include "stereo/paper_kernels.hpp"
-#include "stereo/speckle.hpp"
 #include "stereo/subpixel.hpp"
 #include "stereo/window_sums.hpp"
 
@@ -45,7 +44,7 @@ struct PaperMatcher::Lane {
     std::span<Cost> enhanced;                   // after rule 2: one row
     ImageView<Cost> best, before, second, lower, centre, upper, best_right;  // B rows each
     ImageView<std::int16_t> index, index_right;
-    std::span<std::uint16_t> saturated_columns, saturated, texture_columns, texture;  // one row each
+    WindowColumns window_columns;
 
     Lane(const MatcherConfig& config, int width, int band_rows, Arena& arena) {
         const auto row_size = static_cast<std::size_t>(width + 2 * kPad);
@@ -63,8 +62,7 @@ struct PaperMatcher::Lane {
         for (ImageView<Cost>* plane : {&before, &second, &lower, &centre, &upper, &best_right})
             *plane = arena.image<Cost>(width, band_rows);
         index_right = arena.image<std::int16_t>(width, band_rows);
-        for (auto* row : {&saturated_columns, &saturated, &texture_columns, &texture})
-            *row = arena.take<std::uint16_t>(row_size);
+        window_columns = WindowColumns(width, arena);
     }
 };
 
@@ -90,9 +88,7 @@ PaperMatcher::PaperMatcher(const MatcherConfig& config, int width, int height, i
         plain_left_ = arena.image<std::uint8_t>(width, height);
         plain_right_ = arena.image<std::uint8_t>(width, height);
     }
-    if (config.checks && config.limits.speckle_px > 0)
-        patches_ =
-            arena.take<std::int32_t>(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+    if (config.checks && config.limits.speckle_px > 0) speckles_ = SpeckleScratch(width, arena);
     if (config.checks && config.limits.median)
         median_rows_ = arena.take<std::int16_t>(2 * static_cast<std::size_t>(width));
     state_bytes_ = arena.bytes() - before;
@@ -129,7 +125,7 @@ void PaperMatcher::match(ConstLuma left, ConstLuma right, const DisparityMap& ou
                 answer_row(lane.index.row(y - first), y, out);
         }
     });
-    if (!patches_.empty()) remove_speckles(out, config_.limits.speckle_px, patches_);
+    if (!speckles_.patches.empty()) remove_speckles(out, config_.limits.speckle_px, speckles_);
     if (!median_rows_.empty()) median_3x3(out, median_rows_);
 }
 
@@ -233,17 +229,11 @@ void PaperMatcher::answer_row(const std::int16_t* index, int y, const DisparityM
 
 void PaperMatcher::judge_row(const Pair& pair, int y, bool fresh, int row, Lane& lane,
                              const DisparityMap& out) const {
-    window_sums_row(
-        pair.given_left, y, fresh,
-        [](const std::uint8_t* pixels, int x) { return pixels[x] == 0 || pixels[x] == 255 ? 1 : 0; },
-        lane.saturated_columns.data(), lane.saturated.data());
-    window_sums_row(
-        pair.left, y, fresh,
-        [](const std::uint8_t* pixels, int x) { return x > 0 ? std::abs(pixels[x] - pixels[x - 1]) : 0; },
-        lane.texture_columns.data(), lane.texture.data());
-
-    constexpr int kWindowPixels = (2 * kWindowReach + 1) * (2 * kWindowReach + 1);
     const CheckLimits& limits = config_.limits;
+    std::int16_t* const disparity = out.disparity_q4.row(y);
+    Invalid* const invalid = out.invalid.row(y);
+    judge_windows(pair.given_left, pair.left, y, fresh, limits, lane.window_columns, invalid);
+
     const int last = config_.disparities - 1;
     const int highest_cost = limits.cost_percent * 256 * config_.paper.truncation;
     const std::int16_t* const index = lane.index.row(row);
@@ -254,9 +244,7 @@ void PaperMatcher::judge_row(const Pair& pair, int y, bool fresh, int row, Lane&
     const auto judge = [&](int x) {
         const int k = index[x];
         const int match = x - config_.min_disparity - k;
-        if (100 * lane.saturated[static_cast<std::size_t>(x)] > limits.saturated_percent * kWindowPixels)
-            return Invalid::kSaturation;
-        if (lane.texture[static_cast<std::size_t>(x)] < limits.texture) return Invalid::kTexture;
+        if (invalid[x] != Invalid::kNone) return invalid[x];
         if (match <= 0 || match >= width_) return Invalid::kBorder;
         if (k == last) return Invalid::kRangeEdge;
         if (limits.cost_percent < 100 && 100 * centre[x] > highest_cost) return Invalid::kCost;
@@ -270,8 +258,6 @@ void PaperMatcher::judge_row(const Pair& pair, int y, bool fresh, int row, Lane&
     };
     const Cost* const lower = lane.lower.row(row);
     const Cost* const upper = lane.upper.row(row);
-    std::int16_t* const disparity = out.disparity_q4.row(y);
-    Invalid* const invalid = out.invalid.row(y);
     for (int x = 0; x < width_; ++x) {
         invalid[x] = judge(x);
         disparity[x] = 0;

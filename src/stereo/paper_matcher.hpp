@@ -6,6 +6,7 @@
 
 #include "stereo/matcher.hpp"
 #include "stereo/paper_integer.hpp"
+#include "stereo/speckle.hpp"
 
 namespace groundline::stereo {
 
@@ -42,7 +43,7 @@ class PaperMatcher final : public Matcher {
     std::vector<Lane> lanes_;
     Luma plain_left_;  // without local mean; empty when not asked for
     Luma plain_right_;
-    std::span<std::int32_t> patches_;      // one per pixel, for the speckle test
+    SpeckleScratch speckles_;
     std::span<std::int16_t> median_rows_;  // two rows, for the median
     std::size_t state_bytes_ = 0;
 };

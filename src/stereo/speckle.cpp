@@ -1,71 +1,278 @@
 #include "stereo/speckle.hpp"
 
-#include <cstdlib>
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cassert>
+#include <cstddef>
 #include <utility>
 
-namespace groundline::stereo {
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "stereo/speckle.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace groundline::stereo::HWY_NAMESPACE {
 namespace {
 
-// A forest in one array: a root holds minus the size of its patch, every other pixel the index of a parent.
-std::int32_t root_of(std::span<std::int32_t> forest, std::int32_t pixel) {
-    const auto at = [&](std::int32_t i) -> std::int32_t& { return forest[static_cast<std::size_t>(i)]; };
-    while (at(pixel) >= 0) {
-        const std::int32_t parent = at(pixel);
-        if (at(parent) < 0) return parent;
-        at(pixel) = at(parent);  // halve the path
-        pixel = at(pixel);
-    }
-    return pixel;
+namespace hn = hwy::HWY_NAMESPACE;
+
+using Patch = SpeckleScratch::Patch;
+using Row = SpeckleScratch::Row;
+
+constexpr int kWordBits = 64;
+
+std::size_t word_of(int x) {
+    return static_cast<std::size_t>(x) / kWordBits;
 }
 
-void unite(std::span<std::int32_t> forest, std::int32_t a, std::int32_t b) {
-    a = root_of(forest, a);
-    b = root_of(forest, b);
-    if (a == b) return;
-    std::int32_t& size_a = forest[static_cast<std::size_t>(a)];
-    std::int32_t& size_b = forest[static_cast<std::size_t>(b)];
-    if (size_a > size_b) {  // the larger patch (more negative) stays root: trees stay flat
-        size_b += size_a;
-        size_a = b;
-    } else {
-        size_a += size_b;
-        size_b = a;
+// Writes a bit for each pixel: valid; disparity like that of the right neighbour; like that of the pixel
+// above.
+void compare_neighbours(const std::int16_t* here, const std::int16_t* above, const Invalid* invalid,
+                        int width, std::uint64_t* valid, std::uint64_t* like_right,
+                        std::uint64_t* like_above) {
+    const hn::CappedTag<std::int16_t, kRowPadding / sizeof(std::int16_t)> words;
+    const hn::Rebind<std::uint8_t, decltype(words)> bytes;
+    constexpr std::size_t kLanes = hn::MaxLanes(words);
+    const auto unlike = hn::Set(words, std::int16_t{kDisparityOne + 1});
+    const auto alike = [&](auto a, auto b) HWY_ATTR {
+        return hn::Lt(hn::Max(hn::SaturatedSub(a, b), hn::SaturatedSub(b, a)), unlike);
+    };
+    const auto store = [&](auto mask, std::uint64_t* row, std::size_t x) HWY_ATTR {
+        if constexpr (kLanes >= 8) {
+            static_assert(std::endian::native == std::endian::little);
+            hn::StoreMaskBits(words, mask, reinterpret_cast<std::uint8_t*>(row) + x / 8);
+        } else {  // less than a byte at a time
+            std::array<std::uint8_t, 8> bits;
+            hn::StoreMaskBits(words, mask, bits.data());
+            std::uint64_t& word = row[x / kWordBits];
+            word = (x % kWordBits == 0 ? 0 : word) | std::uint64_t{bits[0]} << x % kWordBits;
+        }
+    };
+    const auto* reasons = reinterpret_cast<const std::uint8_t*>(invalid);
+    for (std::size_t x = 0; x < static_cast<std::size_t>(width); x += hn::Lanes(words)) {
+        const auto disparity = hn::LoadU(words, here + x);
+        const auto reason = hn::PromoteTo(words, hn::LoadU(bytes, reasons + x));
+        store(hn::Eq(reason, hn::Zero(words)), valid, x);
+        store(alike(disparity, hn::LoadU(words, here + x + 1)), like_right, x);
+        store(alike(disparity, hn::LoadU(words, above + x)), like_above, x);
     }
+    const int rest = width % kWordBits;
+    if (rest != 0) valid[word_of(width)] &= ~std::uint64_t{0} >> (kWordBits - rest);
+}
+
+// Calls use(x) for each set bit of a word whose first bit is pixel x0.
+template <typename Use>
+HWY_INLINE void for_each_bit(std::uint64_t word, int x0, Use use) {
+    for (; word != 0; word &= word - 1)
+        use(x0 + std::countr_zero(word));
+}
+
+// The number of the run that pixel x lies in.
+HWY_INLINE std::size_t run_of(const Row& row, int x) {
+    const std::size_t word = word_of(x);
+    const std::uint64_t up_to_x = ~std::uint64_t{0} >> (kWordBits - 1 - x % kWordBits);
+    return static_cast<std::size_t>(row.rank[word] + std::popcount(row.first[word] & up_to_x) - 1);
+}
+
+HWY_INLINE Patch& at(std::span<Patch> patches, std::int32_t index) {
+    return patches[static_cast<std::size_t>(index)];
+}
+
+HWY_INLINE std::int32_t root_of(std::span<Patch> patches, std::int32_t index) {
+    for (;;) {
+        std::int32_t& parent = at(patches, index).parent;
+        if (parent == index) return index;
+        parent = at(patches, parent).parent;  // halve the path
+        index = parent;
+    }
+}
+
+// Finds the runs of the row: `joined` and `first` from the comparisons, the last pixel of each run.
+void find_runs(Row& row, SpeckleScratch& scratch) {
+    std::uint64_t pairs_before = 0;  // valid and like its right neighbour
+    for (std::size_t i = 0; i < row.valid.size(); ++i) {
+        const std::uint64_t valid = row.valid[i];
+        const std::uint64_t pairs = valid & scratch.like_right[i];
+        row.joined[i] = valid & (pairs << 1U | pairs_before >> (kWordBits - 1));
+        row.first[i] = valid & ~row.joined[i];
+        pairs_before = pairs;
+    }
+    int begun = 0;
+    int ended = 0;
+    for (std::size_t i = 0; i < row.valid.size(); ++i) {
+        const std::uint64_t joined_next = i + 1 < row.joined.size() ? row.joined[i + 1] : 0;
+        const std::uint64_t goes_on = row.joined[i] >> 1U | joined_next << (kWordBits - 1);
+        row.rank[i] = begun;
+        begun += std::popcount(row.first[i]);
+        for_each_bit(row.valid[i] & ~goes_on, static_cast<int>(i) * kWordBits,
+                     [&](int x) HWY_ATTR { scratch.last[static_cast<std::size_t>(ended++)] = x; });
+    }
+    row.runs = begun;
+}
+
+// Gives each run the patch of a run above that it touches and unites the others it touches with that.
+void join_above(Row& row, const Row& above, SpeckleScratch& scratch) {
+    const auto patches = scratch.patches;
+    std::fill_n(row.patch.begin(), row.runs, -1);
+    std::uint64_t links_before = 0;
+    for (std::size_t i = 0; i < row.valid.size(); ++i) {
+        const std::uint64_t links = row.valid[i] & above.valid[i] & scratch.like_above[i];
+        // A link says nothing new if the pixels to its left are linked too and belong to the same two runs.
+        const std::uint64_t links_left = links << 1U | links_before >> (kWordBits - 1);
+        links_before = links;
+        const std::uint64_t news = links & ~(links_left & row.joined[i] & above.joined[i]);
+        for_each_bit(news, static_cast<int>(i) * kWordBits, [&](int x) HWY_ATTR {
+            std::int32_t other = root_of(patches, above.patch[run_of(above, x)]);
+            std::int32_t& own = row.patch[run_of(row, x)];
+            if (own < 0) {
+                own = other;
+                return;
+            }
+            own = root_of(patches, own);
+            if (own == other) return;
+            if (at(patches, own).size < at(patches, other).size) std::swap(own, other);
+            at(patches, own).size += at(patches, other).size;
+            at(patches, other).parent = own;
+        });
+    }
+}
+
+// Marks the patch of pixel `seed`: a walk that leaves on each pixel the direction it came from, until it goes
+// back, so that it needs no memory however large the patch.
+void erase(const DisparityMap& map, std::int32_t seed) {
+    constexpr int kSides = 4;
+    constexpr int kNoWayBack = kSides;
+    constexpr int kOnTheWay = 128;  // above every reason
+    constexpr std::array<int, kSides> kX = {1, -1, 0, 0};
+    constexpr std::array<int, kSides> kY = {0, 0, 1, -1};
+    const int width = map.width();
+    const int height = map.height();
+    int x = seed % width;
+    int y = seed / width;
+    std::int16_t* disparity = map.disparity_q4.row(y) + x;
+    Invalid* invalid = map.invalid.row(y) + x;
+    const auto go = [&](int side, int sign) HWY_ATTR {
+        const int dx = sign * kX[static_cast<std::size_t>(side)];
+        const int dy = sign * kY[static_cast<std::size_t>(side)];
+        x += dx;
+        y += dy;
+        disparity += dx + dy * map.disparity_q4.stride;
+        invalid += dx + dy * map.invalid.stride;
+    };
+    *invalid = static_cast<Invalid>(kOnTheWay + kNoWayBack);
+    for (int side = 0;;) {
+        if (side < kSides) {
+            const int dx = kX[static_cast<std::size_t>(side)];
+            const int dy = kY[static_cast<std::size_t>(side)];
+            const bool inside = x + dx >= 0 && x + dx < width && y + dy >= 0 && y + dy < height;
+            if (inside && invalid[dx + dy * map.invalid.stride] == Invalid::kNone) {
+                const int step = disparity[dx + dy * map.disparity_q4.stride] - *disparity;
+                if (step >= -kDisparityOne && step <= kDisparityOne) {
+                    go(side, 1);
+                    *invalid = static_cast<Invalid>(kOnTheWay + side);
+                    side = 0;
+                    continue;
+                }
+            }
+            ++side;
+            continue;
+        }
+        const int came_by = static_cast<int>(*invalid) - kOnTheWay;
+        *invalid = Invalid::kSpeckle;
+        *disparity = 0;
+        if (came_by == kNoWayBack) return;
+        go(came_by, -1);
+        side = came_by + 1;
+    }
+}
+
+// Ends what runs of this row belonged to before it was found to go no further than row `y` - 1, or to be part
+// of another patch.
+int end_patches(const Row& row, int y, int smallest, int unused, SpeckleScratch& scratch,
+                const DisparityMap& map) {
+    for (int run = 0; run < row.runs; ++run) {
+        const std::int32_t index = row.patch[static_cast<std::size_t>(run)];
+        Patch& patch = at(scratch.patches, index);
+        if (patch.parent == index) {
+            if (patch.last_row == y) continue;  // goes on, or ended by an earlier run
+            if (patch.size < smallest) erase(map, patch.seed);
+        }
+        patch.parent = index;
+        patch.last_row = y;
+        scratch.unused[static_cast<std::size_t>(unused++)] = index;
+    }
+    return unused;
+}
+
+void remove_speckles(const DisparityMap& map, int smallest, SpeckleScratch& scratch) {
+    const int width = map.width();
+    const int height = map.height();
+    Row* row = &scratch.rows[0];
+    Row* above = &scratch.rows[1];
+    std::fill(above->valid.begin(), above->valid.end(), 0);
+    above->runs = 0;
+    // Runs of two rows at most have patches: there are always enough.
+    int unused = static_cast<int>(scratch.unused.size());
+    for (int i = 0; i < unused; ++i)
+        scratch.unused[static_cast<std::size_t>(i)] = i;
+    for (int y = 0; y < height; ++y) {
+        compare_neighbours(map.disparity_q4.row(y), map.disparity_q4.row(std::max(y - 1, 0)),
+                           map.invalid.row(y), width, row->valid.data(), scratch.like_right.data(),
+                           scratch.like_above.data());
+        find_runs(*row, scratch);
+        join_above(*row, *above, scratch);
+        std::size_t next = 0;
+        for (std::size_t i = 0; i < row->first.size(); ++i)
+            for_each_bit(row->first[i], static_cast<int>(i) * kWordBits, [&](int x) HWY_ATTR {
+                const int size = scratch.last[next] - x + 1;
+                std::int32_t& index = row->patch[next++];
+                if (index < 0) {
+                    index = scratch.unused[static_cast<std::size_t>(--unused)];
+                    at(scratch.patches, index) = {index, size, y * width + x, y};
+                    return;
+                }
+                index = root_of(scratch.patches, index);
+                Patch& patch = at(scratch.patches, index);
+                patch.size += size;
+                patch.last_row = y;
+            });
+        unused = end_patches(*above, y, smallest, unused, scratch, map);
+        std::swap(row, above);
+    }
+    end_patches(*above, height, smallest, unused, scratch, map);
 }
 
 }  // namespace
+}  // namespace groundline::stereo::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
 
-void remove_speckles(const DisparityMap& map, int smallest, std::span<std::int32_t> scratch) {
-    const int width = map.width();
-    for (int y = 0; y < map.height(); ++y) {
-        const std::int16_t* disparity = map.disparity_q4.row(y);
-        const Invalid* invalid = map.invalid.row(y);
-        const std::int16_t* disparity_above = y > 0 ? map.disparity_q4.row(y - 1) : disparity;
-        const Invalid* invalid_above = y > 0 ? map.invalid.row(y - 1) : invalid;
-        const std::int32_t first = y * width;
-        for (int x = 0; x < width; ++x) {
-            const std::int32_t pixel = first + x;
-            scratch[static_cast<std::size_t>(pixel)] = -1;
-            if (invalid[x] != Invalid::kNone) continue;
-            if (x > 0 && invalid[x - 1] == Invalid::kNone &&
-                std::abs(disparity[x] - disparity[x - 1]) <= kDisparityOne)
-                unite(scratch, pixel - 1, pixel);
-            if (y > 0 && invalid_above[x] == Invalid::kNone &&
-                std::abs(disparity[x] - disparity_above[x]) <= kDisparityOne)
-                unite(scratch, pixel - width, pixel);
-        }
+#if HWY_ONCE
+namespace groundline::stereo {
+
+HWY_EXPORT(remove_speckles);
+
+SpeckleScratch::SpeckleScratch(int width, Arena& arena) {
+    const auto columns = static_cast<std::size_t>(width);
+    const std::size_t words = (columns + 63) / 64;
+    for (Row& row : rows) {
+        for (auto* bits : {&row.valid, &row.joined, &row.first})
+            *bits = arena.take<std::uint64_t>(words);
+        row.rank = arena.take<std::int32_t>(words);
+        row.patch = arena.take<std::int32_t>(columns);
     }
-    for (int y = 0; y < map.height(); ++y) {
-        std::int16_t* disparity = map.disparity_q4.row(y);
-        Invalid* invalid = map.invalid.row(y);
-        for (int x = 0; x < width; ++x) {
-            if (invalid[x] != Invalid::kNone) continue;
-            const std::int32_t root = root_of(scratch, y * width + x);
-            if (-scratch[static_cast<std::size_t>(root)] >= smallest) continue;
-            invalid[x] = Invalid::kSpeckle;
-            disparity[x] = 0;
-        }
-    }
+    like_right = arena.take<std::uint64_t>(words);
+    like_above = arena.take<std::uint64_t>(words);
+    last = arena.take<std::int32_t>(columns);
+    patches = arena.take<Patch>(2 * columns);
+    unused = arena.take<std::int32_t>(2 * columns);
+}
+
+void remove_speckles(const DisparityMap& map, int smallest, SpeckleScratch& scratch) {
+    assert(static_cast<std::size_t>(map.width()) == scratch.last.size());
+    HWY_DYNAMIC_DISPATCH(remove_speckles)(map, smallest, scratch);
 }
 
 }  // namespace groundline::stereo
+#endif

@@ -11,15 +11,16 @@
 
 namespace groundline::test {
 
-// An image that owns its pixels. `extra` elements at the end of each row are filled with a value that no
-// result may depend on.
+// An image that owns its pixels. `extra` elements at the end of each row, and the padding behind the last,
+// are filled with a value that no result may depend on.
 class OwnedLuma {
   public:
     OwnedLuma(int width, int height, int extra = 0)
         : width_(width),
           height_(height),
           stride_(width + extra),
-          pixels_(static_cast<std::size_t>(stride_) * static_cast<std::size_t>(height), std::uint8_t{0xA5}) {}
+          pixels_(static_cast<std::size_t>(stride_) * static_cast<std::size_t>(height) + kRowPadding,
+                  std::uint8_t{0xA5}) {}
     Luma view() { return {pixels_.data(), width_, height_, stride_}; }
     ConstLuma view() const { return {pixels_.data(), width_, height_, stride_}; }
     std::uint8_t& at(int x, int y) { return view().at(x, y); }

@@ -218,7 +218,8 @@ TEST(StereoChecks, SpecklesAreTheSmallPatchesOfAFloodFill) {
                         result->map.disparity_q4.at(x, y) = disparity;
                     }
                 }
-            std::vector<std::int32_t> scratch(73 * 51, 77);
+            Arena arena;
+            SpeckleScratch scratch(73, arena);
             remove_speckles(fast.map, 9, scratch);
             remove_speckles_plainly(plain.map, 9);
             ASSERT_EQ(differing_pixels(fast, plain), 0) << "seed " << seed << " levels " << levels;
