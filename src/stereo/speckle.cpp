@@ -139,52 +139,82 @@ void join_above(Row& row, const Row& above, SpeckleScratch& scratch) {
     }
 }
 
-// Marks the patch of pixel `seed`: a walk that leaves on each pixel the direction it came from, until it goes
-// back, so that it needs no memory however large the patch.
-void erase(const DisparityMap& map, std::int32_t seed) {
-    constexpr int kSides = 4;
-    constexpr int kNoWayBack = kSides;
-    constexpr int kOnTheWay = 128;  // above every reason
-    constexpr std::array<int, kSides> kX = {1, -1, 0, 0};
-    constexpr std::array<int, kSides> kY = {0, 0, 1, -1};
+HWY_INLINE bool alike(int a, int b) {
+    return a - b <= kDisparityOne && b - a <= kDisparityOne;
+}
+
+// Marks the patch that pixel (x, y) belongs to, run by run. The walk notes in the reasons where it entered a
+// run and goes back there when it has seen the run's neighbours below, from left to right, and above, from
+// right to left. So it needs no memory however large the patch, and meets each pixel a fixed number of times.
+void erase(const DisparityMap& map, int x, int y) {
+    constexpr auto kPassed = static_cast<Invalid>(128);     // in a run not yet done with; above every reason
+    constexpr auto kFromAbove = static_cast<Invalid>(129);  // the same, and entered here
+    constexpr auto kFromBelow = static_cast<Invalid>(130);
+    constexpr auto kFromNowhere = static_cast<Invalid>(131);
     const int width = map.width();
     const int height = map.height();
-    int x = seed % width;
-    int y = seed / width;
-    std::int16_t* disparity = map.disparity_q4.row(y) + x;
-    Invalid* invalid = map.invalid.row(y) + x;
-    const auto go = [&](int side, int sign) HWY_ATTR {
-        const int dx = sign * kX[static_cast<std::size_t>(side)];
-        const int dy = sign * kY[static_cast<std::size_t>(side)];
-        x += dx;
-        y += dy;
-        disparity += dx + dy * map.disparity_q4.stride;
-        invalid += dx + dy * map.invalid.stride;
+    std::int16_t* disparity = map.disparity_q4.row(y);
+    Invalid* invalid = map.invalid.row(y);
+    const auto turn_to_row = [&](int to) HWY_ATTR {
+        y = to;
+        disparity = map.disparity_q4.row(y);
+        invalid = map.invalid.row(y);
     };
-    *invalid = static_cast<Invalid>(kOnTheWay + kNoWayBack);
-    for (int side = 0;;) {
-        if (side < kSides) {
-            const int dx = kX[static_cast<std::size_t>(side)];
-            const int dy = kY[static_cast<std::size_t>(side)];
-            const bool inside = x + dx >= 0 && x + dx < width && y + dy >= 0 && y + dy < height;
-            if (inside && invalid[dx + dy * map.invalid.stride] == Invalid::kNone) {
-                const int step = disparity[dx + dy * map.disparity_q4.stride] - *disparity;
-                if (step >= -kDisparityOne && step <= kDisparityOne) {
-                    go(side, 1);
-                    *invalid = static_cast<Invalid>(kOnTheWay + side);
-                    side = 0;
-                    continue;
-                }
+    // Marks the run around x and leaves x at its left end.
+    const auto enter = [&](Invalid from) HWY_ATTR {
+        const auto joins = [&](int a, int b) HWY_ATTR {
+            return invalid[b] == Invalid::kNone && alike(disparity[a], disparity[b]);
+        };
+        invalid[x] = from;
+        for (int end = x; end + 1 < width && joins(end, end + 1); ++end)
+            invalid[end + 1] = kPassed;
+        for (; x > 0 && joins(x, x - 1); --x)
+            invalid[x - 1] = kPassed;
+    };
+    const auto in_same_run = [&](int a, int b) HWY_ATTR {
+        return invalid[b] >= kPassed && alike(disparity[a], disparity[b]);
+    };
+    // Steps along the run until x has a neighbour in row `to`; false at the run's end.
+    const auto find_neighbour = [&](int to, int step, int end) HWY_ATTR {
+        const bool inside = to >= 0 && to < height;
+        const std::int16_t* other_disparity = map.disparity_q4.row(inside ? to : y);
+        const Invalid* other_invalid = map.invalid.row(inside ? to : y);  // in row y none is left to find
+        for (;; x += step) {
+            if (other_invalid[x] == Invalid::kNone && alike(other_disparity[x], disparity[x])) return true;
+            if (x == end || !in_same_run(x, x + step)) return false;
+        }
+    };
+    enter(kFromNowhere);
+    for (bool down = true;;) {
+        if (down) {
+            if (find_neighbour(y + 1, 1, width - 1)) {
+                turn_to_row(y + 1);
+                enter(kFromAbove);
+                continue;
             }
-            ++side;
+            down = false;
+        }
+        if (find_neighbour(y - 1, -1, 0)) {
+            turn_to_row(y - 1);
+            enter(kFromBelow);
+            down = true;
             continue;
         }
-        const int came_by = static_cast<int>(*invalid) - kOnTheWay;
-        *invalid = Invalid::kSpeckle;
-        *disparity = 0;
-        if (came_by == kNoWayBack) return;
-        go(came_by, -1);
-        side = came_by + 1;
+        Invalid from = kPassed;
+        int entry = x;
+        for (bool more = true; more; ++x) {
+            more = x + 1 < width && in_same_run(x, x + 1);
+            if (invalid[x] != kPassed) {
+                from = invalid[x];
+                entry = x;
+            }
+            invalid[x] = Invalid::kSpeckle;
+            disparity[x] = 0;
+        }
+        if (from == kFromNowhere) return;
+        x = entry;
+        down = from == kFromAbove;
+        turn_to_row(down ? y - 1 : y + 1);
     }
 }
 
@@ -197,7 +227,16 @@ int end_patches(const Row& row, int y, int smallest, int unused, SpeckleScratch&
         Patch& patch = at(scratch.patches, index);
         if (patch.parent == index) {
             if (patch.last_row == y) continue;  // goes on, or ended by an earlier run
-            if (patch.size < smallest) erase(map, patch.seed);
+            if (patch.size < smallest) {
+                const int x = patch.seed % map.width();
+                const int seed_row = patch.seed / map.width();
+                if (seed_row + 1 == y) {  // a single run, and the seed its first pixel
+                    std::fill_n(map.disparity_q4.row(seed_row) + x, patch.size, std::int16_t{0});
+                    std::fill_n(map.invalid.row(seed_row) + x, patch.size, Invalid::kSpeckle);
+                } else {
+                    erase(map, x, seed_row);
+                }
+            }
         }
         patch.parent = index;
         patch.last_row = y;
