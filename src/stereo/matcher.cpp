@@ -5,6 +5,7 @@
 #include <string>
 
 #include "core/error.hpp"
+#include "stereo/census_matcher.hpp"
 #include "stereo/paper_matcher.hpp"
 
 namespace groundline::stereo {
@@ -42,6 +43,8 @@ void check(const MatcherConfig& config, int width, int height) {
 std::unique_ptr<Matcher> make_matcher(const MatcherConfig& config, int width, int height, int lanes,
                                       Arena& arena) {
     check(config, width, height);
+    if (config.kind == MatcherKind::kCensus)
+        return std::make_unique<CensusMatcher>(config, width, height, lanes, arena);
     return std::make_unique<PaperMatcher>(config, width, height, lanes, arena);
 }
 

@@ -33,7 +33,10 @@ class Matcher {
     virtual int disparities() const = 0;
 };
 
-enum class MatcherKind : std::uint8_t { kPaper };
+enum class MatcherKind : std::uint8_t {
+    kPaper,   // the paper's: truncated differences, Gaussian window, two rules
+    kCensus,  // census words, semi-global over three paths
+};
 
 struct MatcherConfig {
     MatcherKind kind = MatcherKind::kPaper;

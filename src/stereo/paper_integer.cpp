@@ -4,9 +4,8 @@
 #include <cstdlib>
 
 #include "core/arena.hpp"
+#include "stereo/checks_integer.hpp"
 #include "stereo/local_mean.hpp"
-#include "stereo/median.hpp"
-#include "stereo/speckle.hpp"
 #include "stereo/subpixel.hpp"
 
 namespace groundline::stereo {
@@ -22,16 +21,6 @@ void for_each_cost(const CostVolume& volume, Function function) {
 
 bool near(int other, int cost) {
     return 2 * std::abs(other - cost) < cost;
-}
-
-// Sum of value(x, y) over the 11x11 window, coordinates clamped to the border.
-template <typename Value>
-int window_sum(ConstLuma image, int x, int y, Value value) {
-    int sum = 0;
-    for (int j = -kWindowReach; j <= kWindowReach; ++j)
-        for (int i = -kWindowReach; i <= kWindowReach; ++i)
-            sum += value(std::clamp(x + i, 0, image.width - 1), std::clamp(y + j, 0, image.height - 1));
-    return sum;
 }
 
 int best_of_left(const CostVolume& costs, int x, int y) {
@@ -163,14 +152,8 @@ void match_paper_integer(const MatcherConfig& config, ConstLuma left, ConstLuma 
     const CheckLimits& limits = config.limits;
     const int last = config.disparities - 1;
     const auto judge = [&](int x, int y, int k) {
-        constexpr int kWindowPixels = (2 * kWindowReach + 1) * (2 * kWindowReach + 1);
-        const int saturated = window_sum(
-            left, x, y, [&](int u, int v) { return left.at(u, v) == 0 || left.at(u, v) == 255 ? 1 : 0; });
-        if (100 * saturated > limits.saturated_percent * kWindowPixels) return Invalid::kSaturation;
-        const int texture = window_sum(left, x, y, [&](int u, int v) {
-            return std::abs(seen_left.at(u, v) - seen_left.at(std::max(u - 1, 0), v));
-        });
-        if (texture < limits.texture) return Invalid::kTexture;
+        const Invalid seen = window_reason(left, seen_left, x, y, limits);
+        if (seen != Invalid::kNone) return seen;
         const int match = x - config.min_disparity - k;
         if (match <= 0 || match >= width) return Invalid::kBorder;
         if (k == last) return Invalid::kRangeEdge;
@@ -206,12 +189,7 @@ void match_paper_integer(const MatcherConfig& config, ConstLuma left, ConstLuma 
                 static_cast<std::int16_t>(invalid == Invalid::kNone ? disparity_q4 : 0);
             out.invalid.at(x, y) = invalid;
         }
-    if (config.checks && limits.speckle_px > 0) {
-        SpeckleScratch scratch(width, arena);
-        remove_speckles(out, limits.speckle_px, scratch);
-    }
-    if (config.checks && limits.median)
-        median_3x3(out, arena.take<std::int16_t>(2 * static_cast<std::size_t>(width)));
+    if (config.checks) finish_map(out, limits);
 }
 
 }  // namespace groundline::stereo

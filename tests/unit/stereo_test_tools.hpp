@@ -12,6 +12,7 @@
 
 #include "core/arena.hpp"
 #include "core/parallel.hpp"
+#include "stereo/census_integer.hpp"
 #include "stereo/matcher.hpp"
 #include "stereo/paper_integer.hpp"
 #include "stereo/paper_matcher.hpp"
@@ -43,7 +44,10 @@ inline OwnedResult match_fast(const MatcherConfig& config, ConstLuma left, Const
 
 inline OwnedResult match_plain(const MatcherConfig& config, ConstLuma left, ConstLuma right) {
     OwnedResult result(left.width, left.height);
-    match_paper_integer(config, left, right, result.map);
+    if (config.kind == MatcherKind::kCensus)
+        match_census_integer(config, left, right, result.map);
+    else
+        match_paper_integer(config, left, right, result.map);
     return result;
 }
 
