@@ -13,6 +13,8 @@
 #include <vector>
 
 #include "cli/evaluate_set.hpp"
+#include "cli/matcher_table.hpp"
+#include "cli/truth_sets.hpp"
 #include "core/deterministic_math.hpp"
 #include "core/error.hpp"
 #include "core/evidence.hpp"
@@ -230,27 +232,6 @@ struct SuiteRow {
     std::string problem;
 };
 
-std::vector<fs::path> sets_in(const fs::path& suite) {
-    std::error_code error;
-    std::vector<fs::path> sets;
-    for (fs::directory_iterator entry(suite, error), end; !error && entry != end; entry.increment(error)) {
-        std::error_code ignored;
-        if (fs::is_regular_file(entry->path() / "disp.png", ignored) ||
-            fs::is_directory(entry->path() / "disp", ignored))
-            sets.push_back(entry->path());
-    }
-    if (error)
-        throw Refusal(ExitStatus::kInput,
-                      fmt::format("cannot read the folder '{}': {}", suite.string(), error.message()));
-    if (sets.empty())
-        throw Refusal(ExitStatus::kInput,
-                      fmt::format("no folder in '{}' holds truth; expected folders with disp.png "
-                                  "or disp/ in them",
-                                  suite.string()));
-    std::sort(sets.begin(), sets.end());
-    return sets;
-}
-
 SuiteRow evaluate_replayed(const EvaluateOptions& options, const fs::path& set) {
     SuiteRow row;
     row.name = set.filename().string();
@@ -335,7 +316,7 @@ ordered_json suite_json(const EvaluateOptions& options, const std::vector<SuiteR
 int evaluate_suite(const EvaluateOptions& options) {
     std::vector<SuiteRow> rows;
     int status = 0;
-    for (const fs::path& set : sets_in(options.suite)) {
+    for (const fs::path& set : truth_sets(options.suite, options.sets)) {
         rows.push_back(evaluate_replayed(options, set));
         const SuiteRow& row = rows.back();
         if (!row.problem.empty()) fmt::print(stderr, "groundline: {}: {}\n", row.name, row.problem);
@@ -356,6 +337,9 @@ int evaluate_suite(const EvaluateOptions& options) {
 }  // namespace
 
 int run_evaluate(const EvaluateOptions& options) {
+    if (options.matchers)
+        return run_matcher_table({options.suite, options.sets, options.matcher_names, options.conditions,
+                                  options.disparities, options.json});
     return options.suite.empty() ? evaluate_one(options) : evaluate_suite(options);
 }
 

@@ -364,6 +364,11 @@ TEST_F(Evaluate, SuiteTabulatesEverySetAndTheMean) {
     EXPECT_NE(out_.find("\nmean "), std::string::npos) << out_;
     EXPECT_NE(out_.find("87.5"), std::string::npos) << out_;
     EXPECT_NE(out_.find("\nbroken "), std::string::npos) << out_;
+
+    options.sets = {"a", "b_"};
+    sources.clear();
+    EXPECT_EQ(run(options), 0);
+    EXPECT_EQ(sources, (std::vector<std::string>{"a_set", "b_set"}));
 }
 
 TEST_F(Evaluate, SuiteEndsWhenAReplayIsInterrupted) {
@@ -412,6 +417,42 @@ TEST(EvaluateOptions, CommandLine) {
     EXPECT_THROW(parse({"t"}), CLI::ParseError);
     EXPECT_THROW(parse({"t", "o", "--suite", "d"}), CLI::ParseError);
     EXPECT_THROW(parse({"t", "o", "--set", "a=1"}), CLI::ParseError);
+}
+
+TEST(EvaluateOptions, MatchersHaveTheirOwn) {
+    const auto parse = [](std::vector<std::string> words) {
+        EvaluateOptions options;
+        CLI::App app;
+        add_evaluate_options(app, options);
+        std::reverse(words.begin(), words.end());
+        app.parse(words);
+        return options;
+    };
+    using Words = std::vector<std::string>;
+    EXPECT_FALSE(parse({"--suite", "d"}).matchers);
+    EXPECT_EQ(parse({"--suite", "d", "--sets", "a,b*"}).sets, (Words{"a", "b*"}));
+    const EvaluateOptions all = parse({"--matchers", "--suite", "d"});
+    EXPECT_TRUE(all.matchers);
+    EXPECT_EQ(all.suite, "d");
+    EXPECT_TRUE(all.matcher_names.empty());
+    EXPECT_EQ(all.disparities, 0);
+    const EvaluateOptions some = parse({"--suite", "d", "--matchers", "paper,bm15", "--conditions",
+                                        "clean,noise", "--disparities", "208", "--json"});
+    EXPECT_EQ(some.matcher_names, (Words{"paper", "bm15"}));
+    EXPECT_EQ(some.conditions, (Words{"clean", "noise"}));
+    EXPECT_EQ(some.disparities, 208);
+    for (const Words& wrong :
+         {Words{"--matchers"}, Words{"t", "o", "--matchers"}, Words{"t", "o", "--sets", "a"},
+          Words{"--suite", "d", "--conditions", "clean"}, Words{"--suite", "d", "--disparities", "64"},
+          Words{"--suite", "d", "--matchers", "--set", "a=1"},
+          Words{"--suite", "d", "--matchers", "--config", "f"},
+          Words{"--suite", "d", "--matchers", "--conditions", ","}, Words{"--suite", "d", "--sets", ""},
+          Words{"--suite", "d", "--matchers", "--disparities", "100"},
+          Words{"--suite", "d", "--matchers", "--disparities", "0"},
+          Words{"--suite", "d", "--matchers", "--disparities", "64x"},
+          Words{"--suite", "d", "--matchers", "--disparities", "272"}}) {
+        EXPECT_THROW(parse(wrong), CLI::ParseError) << testing::PrintToString(wrong);
+    }
 }
 
 }  // namespace
