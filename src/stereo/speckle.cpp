@@ -112,8 +112,46 @@ void find_runs(Row& row, SpeckleScratch& scratch) {
     row.runs = begun;
 }
 
+HWY_INLINE SpeckleScratch::Run& run_at(SpeckleScratch& scratch, std::int32_t index) {
+    return scratch.runs[static_cast<std::size_t>(index)];
+}
+
+HWY_INLINE void drop_list(Patch& patch, SpeckleScratch& scratch) {
+    if (patch.head == SpeckleScratch::kNoList) return;
+    run_at(scratch, patch.tail).next = scratch.unused_run;
+    scratch.unused_run = patch.head;
+    patch.head = SpeckleScratch::kNoList;
+}
+
+// Lists a run of a patch that has a list, or is new.
+HWY_INLINE void list_run(Patch& patch, const SpeckleScratch::Run& run, SpeckleScratch& scratch) {
+    const std::int32_t index = scratch.unused_run;
+    if (index == SpeckleScratch::kNoList) return drop_list(patch, scratch);
+    scratch.unused_run = run_at(scratch, index).next;
+    run_at(scratch, index) = run;
+    run_at(scratch, index).next = patch.head;
+    if (patch.head == SpeckleScratch::kNoList) patch.tail = index;
+    patch.head = index;
+}
+
+// Makes `other` part of `own`.
+void unite(std::int32_t own_index, std::int32_t other_index, int smallest, SpeckleScratch& scratch) {
+    Patch& own = at(scratch.patches, own_index);
+    Patch& other = at(scratch.patches, other_index);
+    other.parent = own_index;
+    own.size += other.size;
+    if (own.size >= smallest || own.head == SpeckleScratch::kNoList ||
+        other.head == SpeckleScratch::kNoList) {
+        drop_list(own, scratch);
+        drop_list(other, scratch);
+        return;
+    }
+    run_at(scratch, own.tail).next = other.head;
+    own.tail = other.tail;
+}
+
 // Gives each run the patch of a run above that it touches and unites the others it touches with that.
-void join_above(Row& row, const Row& above, SpeckleScratch& scratch) {
+void join_above(Row& row, const Row& above, int smallest, SpeckleScratch& scratch) {
     const auto patches = scratch.patches;
     std::fill_n(row.patch.begin(), row.runs, -1);
     std::uint64_t links_before = 0;
@@ -133,8 +171,7 @@ void join_above(Row& row, const Row& above, SpeckleScratch& scratch) {
             own = root_of(patches, own);
             if (own == other) return;
             if (at(patches, own).size < at(patches, other).size) std::swap(own, other);
-            at(patches, own).size += at(patches, other).size;
-            at(patches, other).parent = own;
+            unite(own, other, smallest, scratch);
         });
     }
 }
@@ -143,10 +180,11 @@ HWY_INLINE bool alike(int a, int b) {
     return a - b <= kDisparityOne && b - a <= kDisparityOne;
 }
 
-// Marks the patch that pixel (x, y) belongs to, run by run. The walk notes in the reasons where it entered a
-// run and goes back there when it has seen the run's neighbours below, from left to right, and above, from
-// right to left. So it needs no memory however large the patch, and meets each pixel a fixed number of times.
-void erase(const DisparityMap& map, int x, int y) {
+// Marks the patch that pixel (x, y) belongs to where no list of its runs is at hand, run by run. The walk
+// notes in the reasons where it entered a run and goes back there when it has seen the run's neighbours
+// below, from left to right, and above, from right to left. So it needs no memory however large the patch,
+// and meets each pixel a fixed number of times.
+void erase_by_walk(const DisparityMap& map, int x, int y) {
     constexpr auto kPassed = static_cast<Invalid>(128);     // in a run not yet done with; above every reason
     constexpr auto kFromAbove = static_cast<Invalid>(129);  // the same, and entered here
     constexpr auto kFromBelow = static_cast<Invalid>(130);
@@ -218,6 +256,23 @@ void erase(const DisparityMap& map, int x, int y) {
     }
 }
 
+void erase(Patch& patch, SpeckleScratch& scratch, const DisparityMap& map) {
+    if (patch.head == SpeckleScratch::kNoList)
+        return erase_by_walk(map, patch.seed % map.width(), patch.seed / map.width());
+    std::int32_t left = patch.size;
+    for (std::int32_t index = patch.head; left > 0; index = run_at(scratch, index).next) {
+        const SpeckleScratch::Run& run = run_at(scratch, index);
+        std::int16_t* const disparity = map.disparity_q4.row(run.y);
+        Invalid* const invalid = map.invalid.row(run.y);
+        for (int x = run.first; x <= run.last; ++x) {
+            disparity[x] = 0;
+            invalid[x] = Invalid::kSpeckle;
+        }
+        left -= run.last - run.first + 1;
+    }
+    drop_list(patch, scratch);
+}
+
 // Ends what runs of this row belonged to before it was found to go no further than row `y` - 1, or to be part
 // of another patch.
 int end_patches(const Row& row, int y, int smallest, int unused, SpeckleScratch& scratch,
@@ -227,16 +282,7 @@ int end_patches(const Row& row, int y, int smallest, int unused, SpeckleScratch&
         Patch& patch = at(scratch.patches, index);
         if (patch.parent == index) {
             if (patch.last_row == y) continue;  // goes on, or ended by an earlier run
-            if (patch.size < smallest) {
-                const int x = patch.seed % map.width();
-                const int seed_row = patch.seed / map.width();
-                if (seed_row + 1 == y) {  // a single run, and the seed its first pixel
-                    std::fill_n(map.disparity_q4.row(seed_row) + x, patch.size, std::int16_t{0});
-                    std::fill_n(map.invalid.row(seed_row) + x, patch.size, Invalid::kSpeckle);
-                } else {
-                    erase(map, x, seed_row);
-                }
-            }
+            if (patch.size < smallest) erase(patch, scratch, map);
         }
         patch.parent = index;
         patch.last_row = y;
@@ -256,26 +302,32 @@ void remove_speckles(const DisparityMap& map, int smallest, SpeckleScratch& scra
     int unused = static_cast<int>(scratch.unused.size());
     for (int i = 0; i < unused; ++i)
         scratch.unused[static_cast<std::size_t>(i)] = i;
+    for (std::size_t i = 0; i < scratch.runs.size(); ++i)
+        scratch.runs[i].next = static_cast<std::int32_t>(i) - 1;
+    scratch.unused_run = static_cast<std::int32_t>(scratch.runs.size()) - 1;
     for (int y = 0; y < height; ++y) {
         compare_neighbours(map.disparity_q4.row(y), map.disparity_q4.row(std::max(y - 1, 0)),
                            map.invalid.row(y), width, row->valid.data(), scratch.like_right.data(),
                            scratch.like_above.data());
         find_runs(*row, scratch);
-        join_above(*row, *above, scratch);
+        join_above(*row, *above, smallest, scratch);
         std::size_t next = 0;
         for (std::size_t i = 0; i < row->first.size(); ++i)
             for_each_bit(row->first[i], static_cast<int>(i) * kWordBits, [&](int x) HWY_ATTR {
-                const int size = scratch.last[next] - x + 1;
+                const int last = scratch.last[next];
                 std::int32_t& index = row->patch[next++];
-                if (index < 0) {
-                    index = scratch.unused[static_cast<std::size_t>(--unused)];
-                    at(scratch.patches, index) = {index, size, y * width + x, y};
-                    return;
-                }
-                index = root_of(scratch.patches, index);
+                const bool is_new = index < 0;
+                index = is_new ? scratch.unused[static_cast<std::size_t>(--unused)]
+                               : root_of(scratch.patches, index);
                 Patch& patch = at(scratch.patches, index);
-                patch.size += size;
+                if (is_new) patch = {index, 0, y * width + x, y, SpeckleScratch::kNoList, 0};
+                const bool listed = is_new || patch.head != SpeckleScratch::kNoList;
+                patch.size += last - x + 1;
                 patch.last_row = y;
+                if (patch.size >= smallest)
+                    drop_list(patch, scratch);
+                else if (listed)
+                    list_run(patch, {0, y, x, last}, scratch);
             });
         unused = end_patches(*above, y, smallest, unused, scratch, map);
         std::swap(row, above);
@@ -306,6 +358,8 @@ SpeckleScratch::SpeckleScratch(int width, Arena& arena) {
     last = arena.take<std::int32_t>(columns);
     patches = arena.take<Patch>(2 * columns);
     unused = arena.take<std::int32_t>(2 * columns);
+    // Speckles of real pictures need a tenth of this; it is for time only, never for the result.
+    runs = arena.take<Run>(2 * columns);
 }
 
 void remove_speckles(const DisparityMap& map, int smallest, SpeckleScratch& scratch) {

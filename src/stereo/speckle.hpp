@@ -10,7 +10,8 @@
 
 namespace groundline::stereo {
 
-// Memory of remove_speckles(): two rows of runs and the patches they belong to, about 55 bytes a column.
+// Memory of remove_speckles(): two rows of runs, the patches they belong to, and the runs of small patches,
+// about 110 bytes a column.
 struct SpeckleScratch {
     // Pixels of one row, a bit each, and its runs: neighbours in the row that belong together.
     struct Row {
@@ -26,7 +27,16 @@ struct SpeckleScratch {
         std::int32_t size;
         std::int32_t seed;  // any of its pixels, y * width + x
         std::int32_t last_row;
+        std::int32_t head;  // list of its runs; kNoList when it is large, or `runs` were used up
+        std::int32_t tail;
     };
+    struct Run {
+        std::int32_t next;
+        std::int32_t y;
+        std::int32_t first;
+        std::int32_t last;
+    };
+    static constexpr std::int32_t kNoList = -1;
 
     SpeckleScratch() = default;
     SpeckleScratch(int width, Arena& arena);
@@ -37,6 +47,8 @@ struct SpeckleScratch {
     std::span<std::int32_t> last;  // column of each run of the current row
     std::span<Patch> patches;
     std::span<std::int32_t> unused;  // indices of patches
+    std::span<Run> runs;
+    std::int32_t unused_run = 0;  // list of them
 };
 
 // Marks as kSpeckle each valid pixel whose patch has fewer than `smallest` pixels. A patch is connected over
