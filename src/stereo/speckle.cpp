@@ -358,7 +358,7 @@ SpeckleScratch::SpeckleScratch(int width, Arena& arena) {
     last = arena.take<std::int32_t>(columns);
     patches = arena.take<Patch>(2 * columns);
     unused = arena.take<std::int32_t>(2 * columns);
-    // Speckles of real pictures need a tenth of this; it is for time only, never for the result.
+    // Three times what the rendered drive needs with either matcher. Having too few costs time, nothing else.
     runs = arena.take<Run>(2 * columns);
 }
 

@@ -11,7 +11,7 @@
 namespace groundline::stereo {
 
 // Memory of remove_speckles(): two rows of runs, the patches they belong to, and the runs of small patches,
-// about 110 bytes a column.
+// about 100 bytes a column.
 struct SpeckleScratch {
     // Pixels of one row, a bit each, and its runs: neighbours in the row that belong together.
     struct Row {

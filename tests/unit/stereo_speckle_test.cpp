@@ -156,6 +156,7 @@ TEST(StereoSpeckle, FollowsPatchesOfAnyShape) {
         {"other diagonals", [](int x, int y) { return (x - y + 700) % 5 < 2 ? 0 : kGap; }},
         {"ramp", [](int x, int y) { return 16 * x + 9 * y; }},
         {"steep ramp", [](int x, int y) { return 17 * x + 9 * y; }},
+        {"steps of one pixel", [](int x, int y) { return x % 3 == 2 ? kGap : 16 * (x % 3) + 16 * y; }},
         {"tiles", [](int x, int y) { return (x / 10 + y / 9) % 2 * 100; }},
         {"all", [](int, int) { return 5; }},
         {"none", [](int, int) { return kGap; }},
