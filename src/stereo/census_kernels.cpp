@@ -21,33 +21,19 @@ using V16 = hn::Vec<Bytes16>;
 // The blocks of `v` one place up; `fill` comes in at the bottom.
 template <class D, class V>
 HWY_INLINE V BlocksUp(D d, V v, V fill) {
-    if constexpr (hn::MaxLanes(d) <= 16) {
+    if constexpr (hn::MaxLanes(d) == 16)
         return fill;
-    } else if constexpr (hn::MaxLanes(d) == 32) {
+    else
         return hn::ConcatLowerUpper(d, v, fill);
-    } else {
-#if HWY_TARGET <= HWY_AVX3
-        return V{_mm512_alignr_epi64(v.raw, fill.raw, 6)};
-#else
-        return v;
-#endif
-    }
 }
 
 // The blocks of `v` one place down; `fill` comes in at the top.
 template <class D, class V>
 HWY_INLINE V BlocksDown(D d, V v, V fill) {
-    if constexpr (hn::MaxLanes(d) <= 16) {
+    if constexpr (hn::MaxLanes(d) == 16)
         return fill;
-    } else if constexpr (hn::MaxLanes(d) == 32) {
+    else
         return hn::ConcatLowerUpper(d, fill, v);
-    } else {
-#if HWY_TARGET <= HWY_AVX3
-        return V{_mm512_alignr_epi64(fill.raw, v.raw, 2)};
-#else
-        return v;
-#endif
-    }
 }
 
 // out[i] = v[i - 1], out[0] = the last byte of `before`.
@@ -95,14 +81,15 @@ HWY_INLINE std::uint8_t FirstByte(V16 v) {
 // Its lowest byte in every byte of a D.
 template <class D>
 HWY_INLINE hn::Vec<D> SpreadFirst(D d, V16 v) {
-#if HWY_TARGET <= HWY_AVX3 && HWY_ARCH_X86
-    if constexpr (hn::MaxLanes(d) == 64) return hn::Vec<D>{_mm512_broadcastb_epi8(v.raw)};
-#endif
+    if constexpr (hn::MaxLanes(d) == 16) {
+        return hn::TableLookupBytes(v, hn::Zero(d));
+    } else {
 #if HWY_TARGET <= HWY_AVX2 && HWY_ARCH_X86
-    if constexpr (hn::MaxLanes(d) == 32) return hn::Vec<D>{_mm256_broadcastb_epi8(v.raw)};
+        return hn::Vec<D>{_mm256_broadcastb_epi8(v.raw)};
+#else
+        return hn::Set(d, hn::GetLane(v));
 #endif
-    if constexpr (hn::MaxLanes(d) == 16) return hn::TableLookupBytes(v, hn::Zero(d));
-    return hn::Set(d, hn::GetLane(v));
+    }
 }
 
 // --- census
@@ -216,7 +203,7 @@ class Row {
     }
 
     template <bool kSecond>
-    HWY_INLINE void Leftwards(const CensusWinners& winners) const {
+    HWY_INLINE void Leftwards(CensusWinners winners) const {
         alignas(64) std::uint8_t sum_of[kCount * kLanes + 2 * kWidestVector];
         std::uint8_t* const sums = sum_of + kWidestVector;
         std::fill_n(winners.at_right, step_.width + step_.disparities - 1, std::uint16_t{0xFFFF});
@@ -246,7 +233,8 @@ class Row {
     }
 
   private:
-    HWY_INLINE std::uint8_t* At(std::uint8_t* costs, int x) const {
+    template <class Byte>
+    HWY_INLINE Byte* At(Byte* costs, int x) const {
         return costs + static_cast<std::ptrdiff_t>(x) * stride_;
     }
     HWY_INLINE C Load(const std::uint8_t* from) const {
@@ -283,7 +271,7 @@ class Row {
         const C below = Differences(x);
         std::uint8_t* const above = At(step_.above, x);
         const C up = Load(above);
-        const C here = Load(At(const_cast<std::uint8_t*>(step_.here), x));
+        const C here = Load(At(step_.here, x));
         Store(below, above);
         C result;
         HWY_UNROLL(16)
@@ -351,7 +339,7 @@ class Row {
     }
 
     D d_;
-    const CensusStep& step_;
+    CensusStep step_;  // a copy: stores of bytes could change the caller's
     std::ptrdiff_t stride_;
     V infinite_;
     V small_step_;
@@ -380,12 +368,10 @@ HWY_NOINLINE void CostsOf(const CensusStep& step, std::uint8_t* out) {
 template <class What>
 HWY_INLINE void WithVectors(int disparities, const What& what) {
     constexpr int kMost = 256;
-    constexpr int kWidest = HWY_MIN(64, static_cast<int>(hn::MaxLanes(hn::ScalableTag<std::uint8_t>())));
-    if constexpr (kWidest >= 32) {
+    constexpr int kWidest =
+        HWY_MIN(kCostVector, static_cast<int>(hn::MaxLanes(hn::ScalableTag<std::uint8_t>())));
+    if constexpr (kWidest > 16) {
         if (disparities <= 16) return what.template Call<hn::CappedTag<std::uint8_t, 16>, 1>();
-    }
-    if constexpr (kWidest >= 64) {
-        if (disparities <= 32) return what.template Call<hn::CappedTag<std::uint8_t, 32>, 1>();
     }
     using D = hn::CappedTag<std::uint8_t, kWidest>;
     const int count = (disparities + kWidest - 1) / kWidest;
@@ -419,6 +405,94 @@ void CostsRow(const CensusStep& step, std::uint8_t* out) {
     WithVectors(step.disparities, CostsCall{step, out});
 }
 
+// --- answers
+
+using D16 = hn::ScalableTag<std::int16_t>;
+using V16s = hn::Vec<D16>;
+
+// equiangular_q4() by counting: floor((16 m + depth) / (2 depth)) is how many of depth, 3 depth, 5 depth ..
+// 15 depth are at most 16 m, as m <= depth.
+HWY_INLINE V16s EquiangularQ4(V16s lower, V16s centre, V16s upper) {
+    const D16 d;
+    const V16s depth = hn::Sub(hn::Max(lower, upper), centre);
+    const V16s difference = hn::Sub(lower, upper);
+    const V16s reach = hn::ShiftLeft<4>(hn::Abs(difference));
+    const V16s step = hn::Add(depth, depth);
+    V16s odd = depth;
+    V16s count = hn::Zero(d);
+    HWY_UNROLL(8)
+    for (int i = 0; i < 8; ++i) {
+        count = hn::Add(count, hn::VecFromMask(d, hn::Gt(odd, reach)));  // -1 where too far
+        odd = hn::Add(odd, step);
+    }
+    count = hn::IfThenZeroElse(hn::Eq(depth, hn::Zero(d)), hn::Add(count, hn::Set(d, 8)));
+    return hn::IfThenElse(hn::Lt(difference, hn::Zero(d)), hn::Neg(count), count);
+}
+
+template <bool kChecks>
+HWY_INLINE void AnswerRowOf(const CensusAnswer& how, const CensusWinners& winners, std::int16_t* disparity_q4,
+                            std::uint8_t* invalid) {
+    const D16 d;
+    const hn::RebindToUnsigned<D16> du;
+    const hn::Rebind<std::uint8_t, D16> d8;
+    const auto reason = [&](Invalid which) HWY_ATTR { return hn::Set(d, static_cast<std::int16_t>(which)); };
+    const auto load = [&](const std::uint8_t* row, int x)
+                          HWY_ATTR { return hn::PromoteTo(d, hn::LoadU(d8, row + x)); };
+    const int last = how.disparities - 1;
+    if (kChecks && how.left_right_px >= 0)
+        for (int x = 0; x < how.width; ++x)
+            how.at_right[x] =
+                static_cast<std::uint8_t>(255 - (winners.at_right[x - winners.index[x] + last] & 255));
+    const V16s last_index = hn::Set(d, static_cast<std::int16_t>(last));
+    const V16s first_disparity = hn::Set(d, static_cast<std::int16_t>(how.min_disparity));
+    const V16s width = hn::Set(d, static_cast<std::int16_t>(how.width));
+    const auto most = hn::Set(du, static_cast<std::uint16_t>(100 + how.uniqueness_percent));
+    for (int x = 0; x < how.width; x += static_cast<int>(hn::Lanes(d))) {
+        const V16s index = load(winners.index, x);
+        const V16s best = load(winners.best, x);
+        const V16s disparity = hn::Add(index, first_disparity);
+        V16s answer = hn::ShiftLeft<4>(disparity);
+        if (how.subpixel) {
+            const V16s offset = EquiangularQ4(load(winners.lower, x), best, load(winners.upper, x));
+            const auto inside = hn::And(hn::Gt(index, hn::Zero(d)), hn::Lt(index, last_index));
+            answer = hn::Add(answer, hn::IfThenElseZero(inside, offset));
+        }
+        V16s why = hn::Zero(d);
+        if (kChecks) {
+            if (how.left_right_px >= 0) {
+                const V16s apart = hn::Abs(hn::Sub(load(how.at_right, x), index));
+                const auto fails = hn::Gt(apart, hn::Set(d, static_cast<std::int16_t>(how.left_right_px)));
+                why = hn::IfThenElseZero(fails, reason(Invalid::kLeftRight));
+            }
+            if (how.uniqueness_percent >= 0) {
+                const V16s second = load(winners.second, x);
+                const auto ratio = hn::Lt(hn::Mul(hn::BitCast(du, second), hn::Set(du, 100)),
+                                          hn::Mul(hn::BitCast(du, best), most));
+                const auto fails = hn::Or(hn::VecFromMask(d, hn::Eq(second, best)),
+                                          hn::BitCast(d, hn::VecFromMask(du, ratio)));
+                why = hn::IfThenElse(hn::MaskFromVec(fails), reason(Invalid::kUniqueness), why);
+            }
+            why = hn::IfThenElse(hn::Eq(index, last_index), reason(Invalid::kRangeEdge), why);
+            const V16s match = hn::Sub(hn::Iota(d, static_cast<std::int16_t>(x)), disparity);
+            const auto within = hn::And(hn::Gt(match, hn::Zero(d)), hn::Lt(match, width));
+            why = hn::IfThenElse(within, why, reason(Invalid::kBorder));
+            const V16s known = load(invalid, x);
+            why = hn::IfThenElse(hn::Eq(known, hn::Zero(d)), why, known);
+            answer = hn::IfThenElseZero(hn::Eq(why, hn::Zero(d)), answer);
+        }
+        hn::StoreU(hn::DemoteTo(d8, why), d8, invalid + x);
+        hn::StoreU(answer, d, disparity_q4 + x);
+    }
+}
+
+void AnswerRow(const CensusAnswer& how, const CensusWinners& winners, std::int16_t* disparity_q4,
+               std::uint8_t* invalid) {
+    if (how.checks)
+        AnswerRowOf<true>(how, winners, disparity_q4, invalid);
+    else
+        AnswerRowOf<false>(how, winners, disparity_q4, invalid);
+}
+
 }  // namespace groundline::stereo::kernels::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -429,6 +503,7 @@ HWY_EXPORT(CensusRowAny);
 HWY_EXPORT(MirrorRow);
 HWY_EXPORT(CostsRow);
 HWY_EXPORT(Step);
+HWY_EXPORT(AnswerRow);
 
 void census_row(const std::array<const std::uint8_t*, 2 * kCensusReachY + 1>& rows, int width, bool mirrored,
                 const CensusRow& out) {
@@ -442,6 +517,10 @@ void census_costs_row(const CensusStep& step, std::uint8_t* out) {
 }
 void census_step(const CensusStep& step, const CensusWinners& winners) {
     HWY_DYNAMIC_DISPATCH(Step)(step, winners);
+}
+void census_answer_row(const CensusAnswer& how, const CensusWinners& winners, std::int16_t* disparity_q4,
+                       Invalid* invalid) {
+    HWY_DYNAMIC_DISPATCH(AnswerRow)(how, winners, disparity_q4, reinterpret_cast<std::uint8_t*>(invalid));
 }
 
 }  // namespace groundline::stereo::kernels

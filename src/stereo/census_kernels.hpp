@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "core/disparity.hpp"
 #include "stereo/census.hpp"
 
 namespace groundline::stereo::kernels {
@@ -12,9 +13,14 @@ namespace groundline::stereo::kernels {
 // Widest vector of any unit, bytes: what memory is padded to.
 inline constexpr int kWidestVector = 64;
 
+// Widest vector that costs are held in, bytes. Not wider with AVX-512: a path waits for the lowest cost of
+// the pixel before, which takes longer to find in one vector of 64 bytes than in two of 32 (1.16 times the
+// time at 64 disparities).
+inline constexpr int kCostVector = 32;
+
 // Bytes that the costs of one pixel take: all disparities, whole vectors.
 constexpr int cost_bytes(int disparities) {
-    return (disparities + kWidestVector - 1) / kWidestVector * kWidestVector;
+    return (disparities + kCostVector - 1) / kCostVector * kCostVector;
 }
 
 // Census words of one row, low and high bytes apart.
@@ -48,9 +54,9 @@ struct CensusWinners {
 struct CensusStep {
     int width;
     int disparities;
-    CensusRow left;   // census of the row below the matched one (of the last row: itself)
-    CensusRow right;  // the same, mirrored: byte j belongs to x - d = width - 1 - j + (what the caller
-                      // shifts); read at [width - 1 - x + k]
+    CensusRow left;       // census of the row below the matched one (of the last row: itself)
+    CensusRow right;      // the same, mirrored: byte j belongs to x - d = width - 1 - j + (what the caller
+                          // shifts); read at [width - 1 - x + k]
     std::uint8_t* above;  // costs of the row above before smoothing; the row below's replace them
     const std::uint8_t* here;
     std::uint8_t* down;       // path from above: in of the row above, out of this row
@@ -65,5 +71,22 @@ struct CensusStep {
 void census_costs_row(const CensusStep& step, std::uint8_t* out);
 // Smoothing, the three paths, the winners.
 void census_step(const CensusStep& step, const CensusWinners& winners);
+
+// What census_answer_row() needs to know beyond the winners of the row.
+struct CensusAnswer {
+    int width;  // at most kMostCensusWidth
+    int min_disparity;
+    int disparities;
+    bool subpixel;
+    bool checks;             // false: every pixel is answered, `invalid` need not be filled
+    int uniqueness_percent;  // as in CheckLimits; -1 off
+    int left_right_px;       // as in CheckLimits; -1 off
+    std::uint8_t* at_right;  // scratch, one row
+};
+// Turns winners into disparities in 1/16 px and reasons. `invalid` comes with the reasons that are known
+// already, which stay. Writes up to kWidestVector bytes behind both rows.
+void census_answer_row(const CensusAnswer& how, const CensusWinners& winners, std::int16_t* disparity_q4,
+                       Invalid* invalid);
+inline constexpr int kMostCensusWidth = 16384;
 
 }  // namespace groundline::stereo::kernels

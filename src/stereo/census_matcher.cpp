@@ -9,7 +9,6 @@
 
 #include "stereo/census_kernels.hpp"
 #include "stereo/median.hpp"
-#include "stereo/subpixel.hpp"
 #include "stereo/window_sums.hpp"
 
 namespace groundline::stereo {
@@ -43,6 +42,7 @@ struct CensusMatcher::Lane {
     std::ptrdiff_t right_margin = 0;
     std::span<std::uint8_t> above, here, down, smoothed, sums, down_best;
     kernels::CensusWinners winners{};
+    std::uint8_t* at_right = nullptr;  // one row
     WindowColumns window_columns;
 
     Lane(const MatcherConfig& config, int width, Arena& arena) {
@@ -65,6 +65,7 @@ struct CensusMatcher::Lane {
         winners.lower = row(width);
         winners.upper = row(width);
         if (config.checks && config.limits.uniqueness_percent >= 0) winners.second = row(width);
+        at_right = row(width);
         winners.at_right =
             arena.take<std::uint16_t>(static_cast<std::size_t>(width + config.disparities)).data();
         if (config.checks) window_columns = WindowColumns(width, arena);
@@ -142,6 +143,15 @@ void CensusMatcher::match_band(ConstLuma left, ConstLuma right, int number, Lane
                              .sums = lane.sums.data(),
                              .start = true,
                              .answer = false};
+    const CheckLimits& limits = config_.limits;
+    const kernels::CensusAnswer answer{.width = width_,
+                                       .min_disparity = config_.min_disparity,
+                                       .disparities = config_.disparities,
+                                       .subpixel = limits.subpixel,
+                                       .checks = config_.checks,
+                                       .uniqueness_percent = limits.uniqueness_percent,
+                                       .left_right_px = limits.left_right_px,
+                                       .at_right = lane.at_right};
     take_census(band.start - 1);
     kernels::census_costs_row(step, above);
     take_census(band.start);
@@ -155,57 +165,10 @@ void CensusMatcher::match_band(ConstLuma left, ConstLuma right, int number, Lane
         kernels::census_step(step, lane.winners);
         std::swap(above, here);
         if (!step.answer) continue;
+        Invalid* const invalid = out.invalid.row(y);
         if (config_.checks)
-            judge_row(left, y, y == band.first, lane, out);
-        else
-            answer_row(y, lane, out);
-    }
-}
-
-void CensusMatcher::answer_row(int y, const Lane& lane, const DisparityMap& out) const {
-    const auto& [index, best, lower, upper, second, at_right] = lane.winners;
-    const int last = config_.disparities - 1;
-    std::int16_t* const disparity = out.disparity_q4.row(y);
-    Invalid* const invalid = out.invalid.row(y);
-    for (int x = 0; x < width_; ++x) {
-        const int k = index[x];
-        const bool refine = config_.limits.subpixel && k > 0 && k < last;
-        disparity[x] = static_cast<std::int16_t>(kDisparityOne * (config_.min_disparity + k) +
-                                                 (refine ? equiangular_q4(lower[x], best[x], upper[x]) : 0));
-        invalid[x] = Invalid::kNone;
-    }
-}
-
-void CensusMatcher::judge_row(ConstLuma left, int y, bool fresh, Lane& lane, const DisparityMap& out) const {
-    const CheckLimits& limits = config_.limits;
-    std::int16_t* const disparity = out.disparity_q4.row(y);
-    Invalid* const invalid = out.invalid.row(y);
-    judge_windows(left, left, y, fresh, limits, lane.window_columns, invalid);
-
-    const auto& [index, best, lower, upper, second, at_right] = lane.winners;
-    const int last = config_.disparities - 1;
-    const auto judge = [&, index = index, best = best, second = second, at_right = at_right](int x) {
-        const int k = index[x];
-        const int match = x - config_.min_disparity - k;
-        if (invalid[x] != Invalid::kNone) return invalid[x];
-        if (match <= 0 || match >= width_) return Invalid::kBorder;
-        if (k == last) return Invalid::kRangeEdge;
-        if (limits.uniqueness_percent >= 0 &&
-            (second[x] == best[x] || 100 * second[x] < (100 + limits.uniqueness_percent) * best[x]))
-            return Invalid::kUniqueness;
-        const int right_index = 255 - (at_right[x - k + last] & 255);
-        if (limits.left_right_px >= 0 && std::abs(right_index - k) > limits.left_right_px)
-            return Invalid::kLeftRight;
-        return Invalid::kNone;
-    };
-    for (int x = 0; x < width_; ++x) {
-        invalid[x] = judge(x);
-        disparity[x] = 0;
-        if (invalid[x] != Invalid::kNone) continue;
-        const int k = index[x];
-        const bool refine = limits.subpixel && k > 0;
-        disparity[x] = static_cast<std::int16_t>(kDisparityOne * (config_.min_disparity + k) +
-                                                 (refine ? equiangular_q4(lower[x], best[x], upper[x]) : 0));
+            judge_windows(left, left, y, y == band.first, limits, lane.window_columns, invalid);
+        kernels::census_answer_row(answer, lane.winners, out.disparity_q4.row(y), invalid);
     }
 }
 

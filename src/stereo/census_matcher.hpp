@@ -25,8 +25,6 @@ class CensusMatcher final : public Matcher {
     struct Lane;
 
     void match_band(ConstLuma left, ConstLuma right, int number, Lane& lane, const DisparityMap& out) const;
-    void answer_row(int y, const Lane& lane, const DisparityMap& out) const;
-    void judge_row(ConstLuma left, int y, bool fresh, Lane& lane, const DisparityMap& out) const;
 
     MatcherConfig config_;
     int width_ = 0;
