@@ -27,6 +27,7 @@ struct OurMethod {
 constexpr std::array kOurs = {
     OurMethod{"paper", stereo::MatcherKind::kPaper, false},
     OurMethod{"paper_local_mean", stereo::MatcherKind::kPaper, true},
+    OurMethod{"census", stereo::MatcherKind::kCensus, false},
 };
 
 // OpenCV's, with what differs between them. Uniqueness in per cent.

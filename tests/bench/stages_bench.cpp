@@ -1,8 +1,5 @@
-// Time of each stage on a rendered scene, beside OpenCV's block matcher in the same run: quote the ratios.
+// Time of each stage but matching on a rendered scene; matchers: matchers_bench.cpp.
 #include <benchmark/benchmark.h>
-
-#include <opencv2/calib3d.hpp>
-#include <opencv2/core.hpp>
 
 #include "core/arena.hpp"
 #include "core/parallel.hpp"
@@ -29,12 +26,8 @@ struct Pair {
     Pair() {
         synth::Renderer renderer(scene);
         renderer.render(0, serial, frame.left, frame.left_bgr, frame.right);
-        match(true);
-    }
-    void match(bool checks) {
         stereo::MatcherConfig config;
         config.disparities = kDisparities;
-        config.checks = checks;
         stereo::make_matcher(config, map.width(), map.height(), 1, arena)
             ->match(frame.left, frame.right, map, serial);
     }
@@ -44,41 +37,6 @@ Pair& pair() {
     static Pair instance;
     return instance;
 }
-
-cv::Mat mat(Luma image) {
-    return {image.height, image.width, CV_8UC1, image.data, static_cast<std::size_t>(image.stride)};
-}
-
-void paper(benchmark::State& state, bool normalise, bool checks) {
-    Pair& given = pair();
-    Arena arena;
-    stereo::MatcherConfig config;
-    config.disparities = kDisparities;
-    config.normalise_local_mean = normalise;
-    config.checks = checks;
-    const auto matcher = stereo::make_matcher(config, given.map.width(), given.map.height(), 1, arena);
-    const DisparityMap map = DisparityMap::make(arena, given.map.width(), given.map.height());
-    for (auto _ : state)
-        matcher->match(given.frame.left, given.frame.right, map, given.serial);
-    state.counters["state_kB"] = static_cast<double>(matcher->state_bytes()) * 1e-3;
-}
-BENCHMARK_CAPTURE(paper, pure, false, false)->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(paper, checked, false, true)->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(paper, local_mean_checked, true, true)->Unit(benchmark::kMillisecond);
-
-void opencv_block_matcher_15(benchmark::State& state) {
-    Pair& given = pair();
-    cv::setNumThreads(1);
-    const cv::Ptr<cv::StereoBM> matcher = cv::StereoBM::create(kDisparities, 15);
-    matcher->setUniquenessRatio(10);
-    matcher->setSpeckleWindowSize(100);
-    matcher->setSpeckleRange(1);
-    matcher->setDisp12MaxDiff(1);
-    cv::Mat disparity;
-    for (auto _ : state)
-        matcher->compute(mat(given.frame.left), mat(given.frame.right), disparity);
-}
-BENCHMARK(opencv_block_matcher_15)->Unit(benchmark::kMillisecond);
 
 void ground(benchmark::State& state) {
     Pair& given = pair();
