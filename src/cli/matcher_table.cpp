@@ -488,6 +488,9 @@ int run_matcher_table(const MatcherTableOptions& options) {
     else
         print_table(job, groups);
     std::fflush(stdout);
+    if (sets.size() < folders.size())
+        fmt::print(stderr, "groundline: interrupted with {} of {} done\n", sets.size(),
+                   counted(folders.size(), "set"));
     for (const SetScores& set : sets) {
         if (!set.problem.empty()) fmt::print(stderr, "groundline: {}: {}\n", set.name, set.problem);
         for (const std::string& remark : set.remarks)

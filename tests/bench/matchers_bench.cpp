@@ -5,12 +5,15 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
+#include <cstdint>
 #include <cstdio>
+#include <exception>
 #include <map>
 #include <memory>
 #include <opencv2/core/utility.hpp>
-#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "cli/compared_matchers.hpp"
@@ -152,6 +155,7 @@ class Bench {
             words.emplace_back("--benchmark_out_format=json");
         }
         std::vector<char*> pointers;
+        pointers.reserve(words.size());
         for (std::string& word : words)
             pointers.push_back(word.data());
         int count = static_cast<int>(pointers.size());
@@ -353,5 +357,8 @@ int main(int argc, char** argv) {
     } catch (const groundline::Refusal& refusal) {
         fmt::print(stderr, "bench_matchers: {}\n", refusal.what());
         return static_cast<int>(refusal.status());
+    } catch (const std::exception& failure) {
+        fmt::print(stderr, "bench_matchers: {}\n", failure.what());
+        return 1;
     }
 }
