@@ -5,6 +5,7 @@
 
 #include "stereo/census.hpp"
 #include "stereo/checks_integer.hpp"
+#include "stereo/pyramid.hpp"
 #include "stereo/subpixel.hpp"
 
 namespace groundline::stereo {
@@ -118,8 +119,11 @@ CostVolume path_sums(const CostVolume& costs) {
     return sums;
 }
 
-void match_census_integer(const MatcherConfig& config, ConstLuma left, ConstLuma right,
-                          const DisparityMap& out) {
+namespace {
+
+// `coarse`: answers stay beside reasons, windows and speckles are not judged.
+void match(const MatcherConfig& config, bool coarse, ConstLuma left, ConstLuma right,
+           const DisparityMap& out) {
     const int last = config.disparities - 1;
     const CostVolume sums =
         path_sums(smoothed_121(census_costs(left, right, config.min_disparity, config.disparities)));
@@ -144,7 +148,7 @@ void match_census_integer(const MatcherConfig& config, ConstLuma left, ConstLuma
     };
     const CheckLimits& limits = config.limits;
     const auto judge = [&](int x, int y, int k) {
-        const Invalid seen = window_reason(left, left, x, y, limits);
+        const Invalid seen = coarse ? Invalid::kNone : window_reason(left, left, x, y, limits);
         if (seen != Invalid::kNone) return seen;
         const int match = x - config.min_disparity - k;
         if (match <= 0 || match >= left.width) return Invalid::kBorder;
@@ -169,10 +173,27 @@ void match_census_integer(const MatcherConfig& config, ConstLuma left, ConstLuma
                 disparity_q4 += equiangular_q4(sums.at(x, y, k - 1), sums.at(x, y, k), sums.at(x, y, k + 1));
             const Invalid invalid = config.checks ? judge(x, y, k) : Invalid::kNone;
             out.disparity_q4.at(x, y) =
-                static_cast<std::int16_t>(invalid == Invalid::kNone ? disparity_q4 : 0);
+                static_cast<std::int16_t>(coarse || invalid == Invalid::kNone ? disparity_q4 : 0);
             out.invalid.at(x, y) = invalid;
         }
-    if (config.checks) finish_map(out, limits);
+    if (config.checks && !coarse) finish_map(out, limits);
+}
+
+}  // namespace
+
+void match_census_integer(const MatcherConfig& config, ConstLuma left, ConstLuma right,
+                          const DisparityMap& out) {
+    match(config, false, left, right, out);
+}
+
+void search_coarse_integer(const MatcherConfig& config, ConstLuma left, ConstLuma right,
+                           const DisparityMap& out) {
+    MatcherConfig halved_config = config;
+    const CoarseRange range = coarse_range(config.min_disparity, config.disparities);
+    halved_config.min_disparity = range.min_disparity;
+    halved_config.disparities = range.disparities;
+    halved_config.limits.subpixel = true;
+    match(halved_config, true, left, right, out);
 }
 
 }  // namespace groundline::stereo

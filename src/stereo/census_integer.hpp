@@ -30,4 +30,10 @@ CostVolume path_sums(const CostVolume& costs);
 void match_census_integer(const MatcherConfig& config, ConstLuma left, ConstLuma right,
                           const DisparityMap& out);
 
+// The coarse level of the pyramid, on views already halved: every pixel is answered, in absolute disparities
+// of the halved views; a reason beside it says what speaks against the answer. Windows and speckles are not
+// judged.
+void search_coarse_integer(const MatcherConfig& config, ConstLuma left, ConstLuma right,
+                           const DisparityMap& out);
+
 }  // namespace groundline::stereo

@@ -411,7 +411,7 @@ using D16 = hn::ScalableTag<std::int16_t>;
 using V16s = hn::Vec<D16>;
 
 // equiangular_q4() by counting: floor((16 m + depth) / (2 depth)) is how many of depth, 3 depth, 5 depth ..
-// 15 depth are at most 16 m, as m <= depth.
+// 15 depth are at most 16 m, as m <= depth where the centre is lowest.
 HWY_INLINE V16s EquiangularQ4(V16s lower, V16s centre, V16s upper) {
     const D16 d;
     const V16s depth = hn::Sub(hn::Max(lower, upper), centre);
@@ -425,7 +425,8 @@ HWY_INLINE V16s EquiangularQ4(V16s lower, V16s centre, V16s upper) {
         count = hn::Add(count, hn::VecFromMask(d, hn::Gt(odd, reach)));  // -1 where too far
         odd = hn::Add(odd, step);
     }
-    count = hn::IfThenZeroElse(hn::Eq(depth, hn::Zero(d)), hn::Add(count, hn::Set(d, 8)));
+    const auto fits = hn::AndNot(hn::Lt(hn::Min(lower, upper), centre), hn::Gt(depth, hn::Zero(d)));
+    count = hn::IfThenElseZero(fits, hn::Add(count, hn::Set(d, 8)));
     return hn::IfThenElse(hn::Lt(difference, hn::Zero(d)), hn::Neg(count), count);
 }
 
@@ -478,7 +479,7 @@ HWY_INLINE void AnswerRowOf(const CensusAnswer& how, const CensusWinners& winner
             why = hn::IfThenElse(within, why, reason(Invalid::kBorder));
             const V16s known = load(invalid, x);
             why = hn::IfThenElse(hn::Eq(known, hn::Zero(d)), why, known);
-            answer = hn::IfThenElseZero(hn::Eq(why, hn::Zero(d)), answer);
+            if (!how.keep) answer = hn::IfThenElseZero(hn::Eq(why, hn::Zero(d)), answer);
         }
         hn::StoreU(hn::DemoteTo(d8, why), d8, invalid + x);
         hn::StoreU(answer, d, disparity_q4 + x);

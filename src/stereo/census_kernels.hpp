@@ -79,6 +79,7 @@ struct CensusAnswer {
     int disparities;
     bool subpixel;
     bool checks;             // false: every pixel is answered, `invalid` need not be filled
+    bool keep;               // answers stay beside reasons; otherwise they are 0 there
     int uniqueness_percent;  // as in CheckLimits; -1 off
     int left_right_px;       // as in CheckLimits; -1 off
     std::uint8_t* at_right;  // scratch, one row

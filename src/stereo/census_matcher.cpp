@@ -1,13 +1,13 @@
 #include "stereo/census_matcher.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cassert>
 #include <cstdlib>
 #include <cstring>
 #include <utility>
 
 #include "stereo/census_kernels.hpp"
+#include "stereo/census_rows.hpp"
 #include "stereo/median.hpp"
 #include "stereo/window_sums.hpp"
 
@@ -18,25 +18,12 @@ using kernels::CensusRow;
 using kernels::cost_bytes;
 using kernels::kWidestVector;
 
-// Rows of an image kept with their borders repeated.
-constexpr int kKeptRows = 8;
-static_assert(kKeptRows > 2 * kCensusReachY);
-
-// Copies a row and repeats its ends as far as a census reads.
-void keep_row(const std::uint8_t* row, int width, bool mirrored, std::uint8_t* kept) {
-    if (mirrored)
-        kernels::mirror_row(row, width, kept);
-    else
-        std::memcpy(kept, row, static_cast<std::size_t>(width));
-    std::memset(kept - kCensusReachX, kept[0], kCensusReachX);
-    std::memset(kept + width, kept[width - 1], kCensusReachX);
-}
-
 }  // namespace
 
 // Memory of one running task: 5 cost rows of width x disparities bytes, and some rows.
 struct CensusMatcher::Lane {
-    std::array<Luma, 2> kept;  // kKeptRows of the left view; of the right one, mirrored
+    CensusRows left_rows;
+    CensusRows right_rows;
     CensusRow left;
     CensusRow right;  // byte `right_margin` + j: column width - 1 - j
     std::ptrdiff_t right_margin = 0;
@@ -46,8 +33,8 @@ struct CensusMatcher::Lane {
     WindowColumns window_columns;
 
     Lane(const MatcherConfig& config, int width, Arena& arena) {
-        for (Luma& rows : kept)
-            rows = arena.image<std::uint8_t>(2 * kWidestVector + width, kKeptRows);
+        left_rows = CensusRows(width, false, arena);
+        right_rows = CensusRows(width, true, arena);
         const auto row = [&](int bytes) {
             return arena.take<std::uint8_t>(static_cast<std::size_t>(bytes + kWidestVector)).data();
         };
@@ -72,14 +59,19 @@ struct CensusMatcher::Lane {
     }
 };
 
-CensusMatcher::CensusMatcher(const MatcherConfig& config, int width, int height, int lanes, Arena& arena)
-    : config_(config), width_(width), height_(height) {
+CensusMatcher::CensusMatcher(const MatcherConfig& config, int width, int height, int lanes, Arena& arena,
+                             Use use)
+    : config_(config), coarse_(use == Use::kCoarse), width_(width), height_(height) {
+    if (coarse_) {
+        config_.limits.speckle_px = 0;
+        config_.limits.median = false;
+    }
     const std::size_t before = arena.bytes();
     lanes_.reserve(static_cast<std::size_t>(lanes));
     for (int lane = 0; lane < std::min(lanes, band_count(height)); ++lane)
         lanes_.emplace_back(config, width, arena);
-    if (config.checks && config.limits.speckle_px > 0) speckles_ = SpeckleScratch(width, arena);
-    if (config.checks && config.limits.median)
+    if (config_.checks && config_.limits.speckle_px > 0) speckles_ = SpeckleScratch(width, arena);
+    if (config_.checks && config_.limits.median)
         median_rows_ = arena.take<std::int16_t>(2 * static_cast<std::size_t>(width));
     state_bytes_ = arena.bytes() - before;
 }
@@ -99,33 +91,19 @@ void CensusMatcher::match(ConstLuma left, ConstLuma right, const DisparityMap& o
 void CensusMatcher::match_band(ConstLuma left, ConstLuma right, int number, Lane& lane,
                                const DisparityMap& out) const {
     const Band band = band_of(height_, number);
-    int kept_to = std::max(0, band.start - 1 - kCensusReachY);  // first row not yet kept
+    lane.left_rows.restart();
+    lane.right_rows.restart();
     // Leaves the census of row y (clamped to the image) in lane.left and lane.right.
     const auto take_census = [&](int y) {
         y = std::clamp(y, 0, height_ - 1);
-        for (; kept_to <= std::min(y + kCensusReachY, height_ - 1); ++kept_to) {
-            keep_row(left.row(kept_to), width_, false, lane.kept[0].row(kept_to % kKeptRows) + kWidestVector);
-            keep_row(right.row(kept_to), width_, true, lane.kept[1].row(kept_to % kKeptRows) + kWidestVector);
-        }
-        for (const bool mirrored : {false, true}) {
-            std::array<const std::uint8_t*, 2 * kCensusReachY + 1> rows;
-            for (int j = 0; j < static_cast<int>(rows.size()); ++j)
-                rows[static_cast<std::size_t>(j)] =
-                    lane.kept[mirrored ? 1 : 0].row(std::clamp(y + j - kCensusReachY, 0, height_ - 1) %
-                                                    kKeptRows) +
-                    kWidestVector;
-            if (!mirrored) {
-                kernels::census_row(rows, width_, false, lane.left);
-                continue;
-            }
-            const CensusRow words{lane.right.low + lane.right_margin, lane.right.high + lane.right_margin};
-            kernels::census_row(rows, width_, true, words);
-            const auto behind = static_cast<std::size_t>(std::max(0, config_.min_disparity) +
-                                                         cost_bytes(config_.disparities));
-            for (std::uint8_t* plane : {words.low, words.high}) {
-                std::memset(plane - lane.right_margin, plane[0], static_cast<std::size_t>(lane.right_margin));
-                std::memset(plane + width_, plane[width_ - 1], behind);
-            }
+        lane.left_rows.take(left, y, lane.left);
+        const CensusRow words{lane.right.low + lane.right_margin, lane.right.high + lane.right_margin};
+        lane.right_rows.take(right, y, words);
+        const auto behind =
+            static_cast<std::size_t>(std::max(0, config_.min_disparity) + cost_bytes(config_.disparities));
+        for (std::uint8_t* plane : {words.low, words.high}) {
+            std::memset(plane - lane.right_margin, plane[0], static_cast<std::size_t>(lane.right_margin));
+            std::memset(plane + width_, plane[width_ - 1], behind);
         }
     };
     const std::ptrdiff_t shift = lane.right_margin + config_.min_disparity;
@@ -149,6 +127,7 @@ void CensusMatcher::match_band(ConstLuma left, ConstLuma right, int number, Lane
                                        .disparities = config_.disparities,
                                        .subpixel = limits.subpixel,
                                        .checks = config_.checks,
+                                       .keep = coarse_,
                                        .uniqueness_percent = limits.uniqueness_percent,
                                        .left_right_px = limits.left_right_px,
                                        .at_right = lane.at_right};
@@ -166,7 +145,9 @@ void CensusMatcher::match_band(ConstLuma left, ConstLuma right, int number, Lane
         std::swap(above, here);
         if (!step.answer) continue;
         Invalid* const invalid = out.invalid.row(y);
-        if (config_.checks)
+        if (coarse_)
+            std::fill_n(invalid, width_, Invalid::kNone);
+        else if (config_.checks)
             judge_windows(left, left, y, y == band.first, limits, lane.window_columns, invalid);
         kernels::census_answer_row(answer, lane.winners, out.disparity_q4.row(y), invalid);
     }

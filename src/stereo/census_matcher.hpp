@@ -12,8 +12,13 @@ namespace groundline::stereo {
 
 class CensusMatcher final : public Matcher {
   public:
+    enum class Use : std::uint8_t {
+        kWhole,
+        kCoarse,  // of a pyramid: answers stay beside reasons, windows and speckles are not judged
+    };
     // Configuration as checked by make_matcher.
-    CensusMatcher(const MatcherConfig& config, int width, int height, int lanes, Arena& arena);
+    CensusMatcher(const MatcherConfig& config, int width, int height, int lanes, Arena& arena,
+                  Use use = Use::kWhole);
     ~CensusMatcher() override;
 
     void match(ConstLuma left, ConstLuma right, const DisparityMap& out, Parallel& parallel) override;
@@ -27,6 +32,7 @@ class CensusMatcher final : public Matcher {
     void match_band(ConstLuma left, ConstLuma right, int number, Lane& lane, const DisparityMap& out) const;
 
     MatcherConfig config_;
+    bool coarse_ = false;
     int width_ = 0;
     int height_ = 0;
     std::vector<Lane> lanes_;

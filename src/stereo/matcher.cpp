@@ -7,6 +7,7 @@
 #include "core/error.hpp"
 #include "stereo/census_matcher.hpp"
 #include "stereo/paper_matcher.hpp"
+#include "stereo/pyramid_matcher.hpp"
 
 namespace groundline::stereo {
 namespace {
@@ -45,6 +46,8 @@ std::unique_ptr<Matcher> make_matcher(const MatcherConfig& config, int width, in
     check(config, width, height);
     if (config.kind == MatcherKind::kCensus)
         return std::make_unique<CensusMatcher>(config, width, height, lanes, arena);
+    if (config.kind == MatcherKind::kCensusPyramid)
+        return std::make_unique<PyramidMatcher>(config, width, height, lanes, arena);
     return std::make_unique<PaperMatcher>(config, width, height, lanes, arena);
 }
 

@@ -34,8 +34,9 @@ class Matcher {
 };
 
 enum class MatcherKind : std::uint8_t {
-    kPaper,   // the paper's: truncated differences, Gaussian window, two rules
-    kCensus,  // census words, semi-global over three paths
+    kPaper,          // the paper's: truncated differences, Gaussian window, two rules
+    kCensus,         // census words, semi-global over three paths
+    kCensusPyramid,  // the same at half the resolution, then refined
 };
 
 struct MatcherConfig {

@@ -12,9 +12,17 @@ namespace {
 
 using test::OwnedPair;
 
-MatcherConfig census(int disparities, bool checks = true) {
+// Both census matchers keep one contract.
+class CensusMatchers : public testing::TestWithParam<MatcherKind> {};
+INSTANTIATE_TEST_SUITE_P(Of, CensusMatchers,
+                         testing::Values(MatcherKind::kCensus, MatcherKind::kCensusPyramid),
+                         [](const auto& kind) {
+                             return kind.param == MatcherKind::kCensus ? "Census" : "CensusPyramid";
+                         });
+
+MatcherConfig census(MatcherKind kind, int disparities, bool checks = true) {
     MatcherConfig config;
-    config.kind = MatcherKind::kCensus;
+    config.kind = kind;
     config.disparities = disparities;
     config.checks = checks;
     config.limits.speckle_px = 8;
@@ -32,17 +40,17 @@ void expect_equal(const MatcherConfig& config, ConstLuma left, ConstLuma right, 
     use_best_vector_unit();
 }
 
-TEST(CensusMatcher, EqualsThePlainFormAtEveryNumberOfDisparities) {
+TEST_P(CensusMatchers, EqualsThePlainFormAtEveryNumberOfDisparities) {
     on_every_vector_unit([] {});  // says which ran
     for (int disparities = 16; disparities <= 256; disparities += 16) {
         const OwnedPair pair = stepped_pair(disparities + 45, 33, 200);
         for (const bool checks : {false, true})
-            expect_equal(census(disparities, checks), pair.left.view(), pair.right.view(),
+            expect_equal(census(GetParam(), disparities, checks), pair.left.view(), pair.right.view(),
                          std::to_string(disparities) + " disparities");
     }
 }
 
-TEST(CensusMatcher, EqualsThePlainFormAtOddSizesAndStrides) {
+TEST_P(CensusMatchers, EqualsThePlainFormAtOddSizesAndStrides) {
     struct Size {
         int width;
         int height;
@@ -51,7 +59,7 @@ TEST(CensusMatcher, EqualsThePlainFormAtOddSizesAndStrides) {
         for (const int extra : {0, 5}) {
             const OwnedPair pair = stepped_pair(size.width, size.height, 201, 0, extra);
             for (const int uniqueness : {-1, 5}) {
-                MatcherConfig config = census(size.width > 64 ? 48 : 16);
+                MatcherConfig config = census(GetParam(), size.width > 64 ? 48 : 16);
                 config.limits.uniqueness_percent = uniqueness;
                 expect_equal(config, pair.left.view(), pair.right.view(),
                              std::to_string(size.width) + " px wide");
@@ -59,9 +67,9 @@ TEST(CensusMatcher, EqualsThePlainFormAtOddSizesAndStrides) {
         }
 }
 
-TEST(CensusMatcher, EqualsThePlainFormOnPureNoiseAndAtEveryOffset) {
+TEST_P(CensusMatchers, EqualsThePlainFormOnPureNoiseAndAtEveryOffset) {
     for (const int offset : {-40, -9, 0, 6, 30}) {
-        MatcherConfig config = census(32);
+        MatcherConfig config = census(GetParam(), 32);
         config.min_disparity = offset;
         config.limits.speckle_px = 3;
         config.limits.median = offset > 0;

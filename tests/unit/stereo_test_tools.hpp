@@ -16,6 +16,7 @@
 #include "stereo/matcher.hpp"
 #include "stereo/paper_integer.hpp"
 #include "stereo/paper_matcher.hpp"
+#include "stereo/pyramid_integer.hpp"
 #include "support/random_images.hpp"
 
 namespace groundline::stereo {
@@ -46,6 +47,8 @@ inline OwnedResult match_plain(const MatcherConfig& config, ConstLuma left, Cons
     OwnedResult result(left.width, left.height);
     if (config.kind == MatcherKind::kCensus)
         match_census_integer(config, left, right, result.map);
+    else if (config.kind == MatcherKind::kCensusPyramid)
+        match_pyramid_integer(config, left, right, result.map);
     else
         match_paper_integer(config, left, right, result.map);
     return result;

@@ -1,0 +1,52 @@
+// What the coarse-to-fine census matcher computes, in constants.
+#pragma once
+
+#include <cstdint>
+
+#include "stereo/census.hpp"
+
+namespace groundline::stereo {
+
+// Coarse: the census matcher on both views halved (means of 2x2 px), over half the disparities. Its answer,
+// doubled, is the prediction for 2x2 px.
+//
+// Thin: what is 5 px wide near the camera is 2.5 px wide there and drowns in its surroundings. So every pixel
+// of every kThinStep-th row looks for a disparity at least kThinNearer px nearer than predicted, by a window
+// of 3 px times kThinRows such rows (poles and trunks stand upright) and by the pairs of the census that a
+// narrow thing contains. Where the best of them is better than half of what the prediction reaches, and good
+// in itself, it becomes the prediction.
+//
+// Fine: around each prediction, within kFineReachQ4, the lowest cost of a 7x7 window of full-resolution
+// census words plus the distance from the prediction in 1/16 px.
+inline constexpr int kThinStep = 4;
+inline constexpr int kThinRows = 8;
+inline constexpr int kThinNearer = 4;
+inline constexpr int kThinPredictedWithin = 2;  // px around the prediction that count as predicted
+inline constexpr int kThinHighest = 79;         // of 255: 30 percent of the bits differ
+inline constexpr int kFineReachQ4 = 24;
+inline constexpr int kFineWindowReach = 3;
+
+// Bits of the census word whose pairs reach at most 2 px to the side.
+constexpr std::uint16_t narrow_pairs() {
+    unsigned bits = 0;
+    for (std::size_t i = 0; i < kCensusPairs.size(); ++i)
+        if (kCensusPairs[i].dx >= -2 && kCensusPairs[i].dx <= 2) bits |= 1U << i;
+    return static_cast<std::uint16_t>(bits);
+}
+inline constexpr std::uint16_t kNarrowPairs = narrow_pairs();
+
+// The search range of the coarse level: covers min_disparity .. min_disparity + disparities - 1, halved.
+struct CoarseRange {
+    int min_disparity;
+    int disparities;
+};
+constexpr CoarseRange coarse_range(int min_disparity, int disparities) {
+    const int first = min_disparity >> 1;
+    const int count = ((min_disparity + disparities - 1) >> 1) - first + 1;
+    return {first, (count + 15) / 16 * 16};
+}
+constexpr int halved(int size) {
+    return (size + 1) / 2;
+}
+
+}  // namespace groundline::stereo

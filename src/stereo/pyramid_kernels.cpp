@@ -1,0 +1,242 @@
+#include "stereo/pyramid_kernels.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "stereo/pyramid_kernels.cpp"
+#include <hwy/foreach_target.h>  // NOLINT(misc-header-include-cycle): includes this file once per unit
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace groundline::stereo::kernels::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+// Vectors of at most 32 bytes: a block and its margins are three of them.
+using D = hn::CappedTag<std::uint8_t, 32>;
+using V = hn::Vec<D>;
+constexpr int kLanes = static_cast<int>(hn::MaxLanes(D()));
+constexpr int kSpan = kBlock + 2 * kBlockMargin;
+static_assert(kSpan % kLanes == 0 && kBlock % kLanes == 0 && kFineWindowReach <= kBlockMargin);
+
+HWY_INLINE V Distance(V a, V b) {
+    return hn::Or(hn::SaturatedSub(a, b), hn::SaturatedSub(b, a));
+}
+HWY_INLINE auto AtMost(V a, V b) {
+    return hn::Eq(hn::Min(a, b), a);
+}
+
+// Differing bits of the words at columns x .. of one row, the right ones `shift` columns further left.
+template <bool kNarrow>
+HWY_INLINE V Differences(const CensusPair& row, int x, std::ptrdiff_t shift) {
+    const D d;
+    V low = hn::Xor(hn::LoadU(d, row.left.low + x), hn::LoadU(d, row.right.low + x - shift));
+    V high = hn::Xor(hn::LoadU(d, row.left.high + x), hn::LoadU(d, row.right.high + x - shift));
+    if (kNarrow) {
+        low = hn::And(low, hn::Set(d, kNarrowPairs & 255U));
+        high = hn::And(high, hn::Set(d, kNarrowPairs >> 8U));
+    }
+    return hn::Add(hn::PopulationCount(low), hn::PopulationCount(high));
+}
+
+// Sums down `kRows` rows for `count` rows, over a block and its margins; row r sums rows r .. r + kRows - 1.
+template <int kRows, bool kNarrow>
+HWY_INLINE void SumColumns(const CensusPair* rows, int count, int first_x, std::ptrdiff_t shift,
+                           std::uint8_t* differences, std::uint8_t* sums) {
+    const D d;
+    for (int i = 0; i < kSpan; i += kLanes) {
+        const int x = first_x - kBlockMargin + i;
+        V sum = hn::Zero(d);
+        for (int r = 0; r < kRows - 1; ++r) {
+            const V here = Differences<kNarrow>(rows[r], x, shift);
+            hn::Store(here, d, differences + r * kSpan + i);
+            sum = hn::Add(sum, here);
+        }
+        for (int r = 0; r < count; ++r) {
+            const V here = Differences<kNarrow>(rows[r + kRows - 1], x, shift);
+            hn::Store(here, d, differences + (r + kRows - 1) * kSpan + i);
+            sum = hn::Add(sum, here);
+            hn::Store(sum, d, sums + r * kSpan + i);
+            sum = hn::Sub(sum, hn::Load(d, differences + r * kSpan + i));
+        }
+    }
+}
+
+// Repeats the columns at the image's ends, where a block's margins lie outside; `reach` of them are read.
+HWY_INLINE void RepeatEnds(int count, int first_x, int width, int reach, std::uint8_t* sums) {
+    const int last = width - first_x + kBlockMargin;  // one behind the last column
+    for (int r = 0; r < count; ++r) {
+        std::uint8_t* const row = sums + r * kSpan;
+        if (first_x == 0)
+            for (int i = 1; i <= reach; ++i)
+                row[kBlockMargin - i] = row[kBlockMargin];
+        for (int i = 0; i < reach && last + i < kSpan; ++i)
+            row[last + i] = row[last - 1];
+    }
+}
+
+void ThinBlockAny(const ThinBlock& block) {
+    const D d;
+    alignas(64) std::uint8_t differences[(kMostThinRows + kThinRows) * kSpan];
+    alignas(64) std::uint8_t sums[kMostThinRows * kSpan + 64];
+    alignas(64) std::uint8_t predicted[kMostThinRows * kBlock];  // lowest cost where it was predicted
+    alignas(64) std::uint8_t nearer[kMostThinRows * kBlock];     // lowest cost nearer than that
+    std::memset(predicted, 255, sizeof predicted);
+    std::memset(nearer, 255, sizeof nearer);
+    const int used = std::min(kBlock, block.width - block.first_x);
+    int farthest = 255;
+    for (int r = 0; r < block.count; ++r) {
+        const std::uint8_t* const row = block.predicted + r * block.predicted_stride;
+        farthest = std::min<int>(farthest, *std::min_element(row, row + used));
+        std::memset(block.nearer + r * block.nearer_stride, 0, kBlock);
+    }
+    const V within = hn::Set(d, kThinPredictedWithin);
+    const V apart = hn::Set(d, kThinNearer);
+    for (int k = std::max(0, farthest - kThinPredictedWithin); k < block.disparities; ++k) {
+        SumColumns<kThinRows, true>(block.rows, block.count, block.first_x, block.min_disparity + k,
+                                    differences, sums);
+        RepeatEnds(block.count, block.first_x, block.width, 1, sums);
+        const V index = hn::Set(d, static_cast<std::uint8_t>(k));
+        for (int r = 0; r < block.count; ++r) {
+            const std::uint8_t* const row = sums + r * kSpan + kBlockMargin;
+            for (int i = 0; i < kBlock; i += kLanes) {
+                if (i >= used) break;
+                const V cost =
+                    hn::SaturatedAdd(hn::SaturatedAdd(hn::LoadU(d, row + i - 1), hn::LoadU(d, row + i)),
+                                     hn::LoadU(d, row + i + 1));
+                const V at = hn::LoadU(d, block.predicted + r * block.predicted_stride + i);
+                const auto is_predicted = AtMost(Distance(index, at), within);
+                std::uint8_t* const lowest = predicted + r * kBlock + i;
+                const V old = hn::Load(d, lowest);
+                hn::Store(hn::IfThenElse(is_predicted, hn::Min(old, cost), old), d, lowest);
+
+                std::uint8_t* const lowest_nearer = nearer + r * kBlock + i;
+                std::uint8_t* const which = block.nearer + r * block.nearer_stride + i;
+                const V best = hn::Load(d, lowest_nearer);
+                const auto is_nearer = AtMost(apart, hn::SaturatedSub(index, at));
+                const auto wins = hn::And(is_nearer, hn::Lt(cost, best));
+                hn::Store(hn::IfThenElse(wins, cost, best), d, lowest_nearer);
+                hn::StoreU(hn::IfThenElse(wins, index, hn::LoadU(d, which)), d, which);
+            }
+        }
+    }
+    for (int r = 0; r < block.count; ++r) {
+        std::uint8_t* const which = block.nearer + r * block.nearer_stride;
+        for (int i = 0; i < used; ++i) {
+            const int cost = nearer[r * kBlock + i];
+            const int match = block.first_x + i - block.min_disparity - which[i];
+            const bool good = 2 * cost < predicted[r * kBlock + i] && cost <= kThinHighest && match >= 0 &&
+                              match < block.width;
+            which[i] = static_cast<std::uint8_t>(good ? which[i] : 0);
+        }
+    }
+}
+
+void FineBlockAny(const FineBlock& block) {
+    const D d;
+    constexpr int kWindow = 2 * kFineWindowReach + 1;
+    constexpr int kMost = 256;
+    // Which indices are predicted somewhere in the block.
+    std::uint8_t predicted[kMost + 2 * 3] = {};
+    int lowest = kMost;
+    int highest = 0;
+    for (const std::uint8_t* row : block.predicted_index)
+        for (int i = 0; i < kBlock; ++i) {
+            const int index = row[i];
+            predicted[index + 3] = 1;
+            lowest = std::min(lowest, index);
+            highest = std::max(highest, index);
+        }
+    // A candidate is at most 2 away from a predicted index; its neighbours are needed for the sub-pixel fit.
+    const auto near_predicted = [&](int k, int reach) {
+        bool is = false;
+        for (int i = -reach; i <= reach; ++i)
+            is = is || predicted[k + i + 3] != 0;
+        return is;
+    };
+    const int last = block.disparities - 1;
+
+    alignas(64) std::uint8_t differences[(kFineRows + kWindow) * kSpan];
+    alignas(64) std::uint8_t sums[kFineRows * kSpan + 64];
+    alignas(64) std::uint8_t costs[3][kFineRows * kBlock];  // of index k at k % 3
+    std::memset(costs, 255, sizeof costs);
+    for (const CensusWinners& row : block.winners) {
+        std::memset(row.best, 255, kBlock);
+        std::memset(row.index, 0, kBlock);
+    }
+    const V reach = hn::Set(d, kFineReachQ4);
+    const V two = hn::Set(d, 2);
+    for (int k = std::max(0, lowest - 3); k <= std::min(last, highest + 3) + 1; ++k) {
+        std::uint8_t* const here = costs[k % 3];
+        if (k <= last && k <= highest + 3 && near_predicted(k, 3)) {
+            SumColumns<kWindow, false>(block.rows.data(), kFineRows, block.first_x, block.min_disparity + k,
+                                       differences, sums);
+            RepeatEnds(kFineRows, block.first_x, block.width, kFineWindowReach, sums);
+            const V disparity_low =
+                hn::Set(d, static_cast<std::uint8_t>(kDisparityOne * (block.min_disparity + k)));
+            for (int r = 0; r < kFineRows; ++r) {
+                const std::uint8_t* const sum = sums + r * kSpan + kBlockMargin;
+                const auto at = [&](int x) HWY_ATTR { return hn::LoadU(d, sum + x); };
+                const std::uint8_t* const low = block.predicted_low[static_cast<std::size_t>(r / 2)];
+                for (int i = 0; i < kBlock; i += kLanes) {
+                    const V outer = hn::AverageRound(hn::AverageRound(at(i - 3), at(i + 3)),
+                                                     hn::AverageRound(at(i - 2), at(i + 2)));
+                    const V inner = hn::AverageRound(hn::AverageRound(at(i - 1), at(i + 1)), at(i));
+                    // Right modulo 256 where it matters: up to 2.5 px from the prediction.
+                    const hn::RebindToSigned<D> ds;
+                    const V off = hn::BitCast(
+                        d, hn::Abs(hn::BitCast(ds, hn::Sub(disparity_low, hn::LoadU(d, low + i)))));
+                    hn::Store(hn::SaturatedAdd(hn::Add(outer, inner), off), d, here + r * kBlock + i);
+                }
+            }
+        }
+        // The candidates of index k - 1, now that both its neighbours are known.
+        const int candidate = k - 1;
+        if (candidate < 0 || candidate > last || !near_predicted(candidate, 2)) continue;
+        const std::uint8_t* const centre = costs[candidate % 3];
+        const std::uint8_t* const below = costs[(candidate + 2) % 3];
+        const V index = hn::Set(d, static_cast<std::uint8_t>(candidate));
+        const V disparity_low =
+            hn::Set(d, static_cast<std::uint8_t>(kDisparityOne * (block.min_disparity + candidate)));
+        for (int r = 0; r < kFineRows; ++r) {
+            const CensusWinners& out = block.winners[static_cast<std::size_t>(r)];
+            const std::uint8_t* const low = block.predicted_low[static_cast<std::size_t>(r / 2)];
+            const std::uint8_t* const at = block.predicted_index[static_cast<std::size_t>(r / 2)];
+            for (int i = 0; i < kBlock; i += kLanes) {
+                const hn::RebindToSigned<D> ds;
+                const V off =
+                    hn::BitCast(d, hn::Abs(hn::BitCast(ds, hn::Sub(disparity_low, hn::LoadU(d, low + i)))));
+                const auto is_near = AtMost(Distance(index, hn::LoadU(d, at + i)), two);
+                const V cost = hn::Load(d, centre + r * kBlock + i);
+                const V best = hn::LoadU(d, out.best + i);
+                const auto wins = hn::And(hn::And(is_near, AtMost(off, reach)), hn::Lt(cost, best));
+                const auto put = [&](std::uint8_t* row, V value) HWY_ATTR {
+                    hn::StoreU(hn::IfThenElse(wins, value, hn::LoadU(d, row + i)), d, row + i);
+                };
+                hn::StoreU(hn::IfThenElse(wins, cost, best), d, out.best + i);
+                put(out.index, index);
+                put(out.lower, hn::Load(d, below + r * kBlock + i));
+                put(out.upper, hn::Load(d, here + r * kBlock + i));
+            }
+        }
+    }
+}
+
+}  // namespace groundline::stereo::kernels::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace groundline::stereo::kernels {
+
+HWY_EXPORT(ThinBlockAny);
+HWY_EXPORT(FineBlockAny);
+
+void thin_block(const ThinBlock& block) {
+    HWY_DYNAMIC_DISPATCH(ThinBlockAny)(block);
+}
+void fine_block(const FineBlock& block) {
+    HWY_DYNAMIC_DISPATCH(FineBlockAny)(block);
+}
+
+}  // namespace groundline::stereo::kernels
+#endif

@@ -1,0 +1,303 @@
+#include "stereo/pyramid_matcher.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cstring>
+
+#include "stereo/census_rows.hpp"
+#include "stereo/median.hpp"
+#include "stereo/pyramid.hpp"
+#include "stereo/pyramid_kernels.hpp"
+#include "stereo/window_sums.hpp"
+
+namespace groundline::stereo {
+namespace {
+
+using kernels::CensusPair;
+using kernels::CensusRow;
+using kernels::kBlock;
+using kernels::kBlockMargin;
+using kernels::kFineRows;
+using kernels::kWidestVector;
+
+constexpr int kThinRowsBefore = kThinRows / 2;
+constexpr int kPartRows = 64;  // rows that one task finishes; a multiple of kFineRows and of kThinStep
+constexpr int kPartThinRows = kPartRows / kThinStep;
+static_assert(kPartRows % kFineRows == 0 && kPartThinRows <= kernels::kMostThinRows);
+// Rows of census words that a task holds: all it looks at in the thin search, or a strip and its windows.
+constexpr int kHeldRows = kPartThinRows + kThinRows - 1;
+static_assert(kHeldRows >= kFineRows + 2 * kFineWindowReach);
+
+int whole_blocks(int width) {
+    return (width + kBlock - 1) / kBlock * kBlock;
+}
+
+CoarseRange range_of(const MatcherConfig& config) {
+    return coarse_range(config.min_disparity, config.disparities);
+}
+
+MatcherConfig coarse_config(const MatcherConfig& config) {
+    MatcherConfig coarse = config;
+    coarse.kind = MatcherKind::kCensus;
+    coarse.min_disparity = range_of(config).min_disparity;
+    coarse.disparities = range_of(config).disparities;
+    coarse.limits.subpixel = true;
+    return coarse;
+}
+
+void halve_row(const std::uint8_t* above, const std::uint8_t* below, int width, std::uint8_t* out) {
+    const int pairs = width / 2;
+    for (int x = 0; x < pairs; ++x)
+        out[x] = static_cast<std::uint8_t>(
+            (above[2 * x] + above[2 * x + 1] + below[2 * x] + below[2 * x + 1] + 2) >> 2);
+    if (width % 2 != 0)
+        out[pairs] = static_cast<std::uint8_t>((2 * above[width - 1] + 2 * below[width - 1] + 2) >> 2);
+}
+
+}  // namespace
+
+// The rows that one task works on.
+struct PyramidMatcher::Part {
+    int first;
+    int last;
+};
+
+// Memory of one running task.
+struct PyramidMatcher::Lane {
+    CensusRows left_rows, right_rows;
+    std::array<CensusPair, kHeldRows> held;  // right words at column 0
+    std::ptrdiff_t before = 0;               // columns of a right row in front of column 0
+    std::size_t behind = 0;                  // ... and behind the last
+    ImageView<std::uint8_t> predicted;       // thin search: index predicted, a row each
+    std::array<std::span<std::uint8_t>, kFineRows / 2> predicted_low, predicted_index;  // of a strip
+    std::array<kernels::CensusWinners, kFineRows> winners{};
+    std::span<std::uint16_t> at_right;
+    std::span<std::uint8_t> right_index;
+    WindowColumns window_columns;
+
+    Lane(const MatcherConfig& config, int width, Arena& arena)
+        : left_rows(width, false, arena), right_rows(width, false, arena) {
+        const int blocks = whole_blocks(width);
+        const int shift = config.min_disparity + config.disparities;
+        const int margin = kBlockMargin + kWidestVector;
+        before = margin + std::max(0, shift);
+        behind = static_cast<std::size_t>(margin + blocks - width + std::max(0, -config.min_disparity));
+        const auto plane = [&](std::ptrdiff_t in_front, std::size_t rest) {
+            const auto bytes = static_cast<std::size_t>(in_front + width) + rest;
+            return arena.take<std::uint8_t>(bytes).data() + in_front;
+        };
+        const auto rest = static_cast<std::size_t>(margin + blocks - width);
+        for (CensusPair& row : held)
+            row = {{plane(margin, rest), plane(margin, rest)},
+                   {plane(before, behind), plane(before, behind)}};
+        predicted = arena.image<std::uint8_t>(blocks, kPartThinRows);
+        for (auto* rows : {&predicted_low, &predicted_index})
+            for (auto& row : *rows)
+                row = arena.take<std::uint8_t>(static_cast<std::size_t>(blocks));
+        for (kernels::CensusWinners& row : winners)
+            for (std::uint8_t** part : {&row.index, &row.best, &row.lower, &row.upper})
+                *part = arena.take<std::uint8_t>(static_cast<std::size_t>(blocks)).data();
+        at_right = arena.take<std::uint16_t>(static_cast<std::size_t>(width + config.disparities));
+        right_index = arena.take<std::uint8_t>(static_cast<std::size_t>(blocks));
+        if (config.checks) window_columns = WindowColumns(width, arena);
+    }
+
+    void take_census(ConstLuma left, ConstLuma right, int y, const CensusPair& row) {
+        left_rows.take(left, y, row.left);
+        right_rows.take(right, y, row.right);
+        const int width = left.width;
+        for (std::uint8_t* plane : {row.right.low, row.right.high}) {
+            std::memset(plane - before, plane[0], static_cast<std::size_t>(before));
+            std::memset(plane + width, plane[width - 1], behind);
+        }
+    }
+};
+
+PyramidMatcher::PyramidMatcher(const MatcherConfig& config, int width, int height, int lanes, Arena& arena)
+    : config_(config), width_(width), height_(height) {
+    const std::size_t before = arena.bytes();
+    half_left_ = arena.image<std::uint8_t>(halved(width), halved(height));
+    half_right_ = arena.image<std::uint8_t>(halved(width), halved(height));
+    coarse_map_ = DisparityMap::make(arena, halved(width), halved(height));
+    thin_ = arena.image<std::uint8_t>(whole_blocks(width), (height + kThinStep - 1) / kThinStep);
+    coarse_ = std::make_unique<CensusMatcher>(coarse_config(config), halved(width), halved(height), lanes,
+                                              arena, CensusMatcher::Use::kCoarse);
+    lanes_.reserve(static_cast<std::size_t>(lanes));
+    for (int lane = 0; lane < lanes; ++lane)
+        lanes_.emplace_back(config, width, arena);
+    if (config.checks && config.limits.speckle_px > 0) speckles_ = SpeckleScratch(width, arena);
+    if (config.checks && config.limits.median)
+        median_rows_ = arena.take<std::int16_t>(2 * static_cast<std::size_t>(width));
+    state_bytes_ = arena.bytes() - before;
+}
+
+PyramidMatcher::~PyramidMatcher() = default;
+
+void PyramidMatcher::match(ConstLuma left, ConstLuma right, const DisparityMap& out, Parallel& parallel) {
+    assert(left.same_size(width_, height_) && right.same_size(width_, height_));
+    assert(out.disparity_q4.same_size(width_, height_) && out.invalid.same_size(width_, height_));
+    assert(static_cast<std::size_t>(parallel.lanes()) <= lanes_.size());
+    const int parts = (height_ + kPartRows - 1) / kPartRows;
+    const auto part_of = [&](int number) {
+        return Part{number * kPartRows, std::min((number + 1) * kPartRows, height_)};
+    };
+    parallel.for_each(parts, [&](int number, int /*lane*/) {
+        const Part part = part_of(number);
+        for (int y = part.first; y < part.last; y += 2) {
+            const int below = std::min(y + 1, height_ - 1);
+            halve_row(left.row(y), left.row(below), width_, half_left_.row(y / 2));
+            halve_row(right.row(y), right.row(below), width_, half_right_.row(y / 2));
+        }
+    });
+    coarse_->match(half_left_, half_right_, coarse_map_, parallel);
+    parallel.for_each(parts, [&](int number, int lane_number) {
+        Lane& lane = lanes_[static_cast<std::size_t>(lane_number)];
+        find_thin(left, right, part_of(number), lane);
+        refine(left, right, part_of(number), lane, out);
+    });
+    if (!speckles_.patches.empty()) remove_speckles(out, config_.limits.speckle_px, speckles_);
+    if (!median_rows_.empty()) median_3x3(out, median_rows_);
+}
+
+void PyramidMatcher::find_thin(ConstLuma left, ConstLuma right, const Part& part, Lane& lane) const {
+    const int rows = thin_.height;
+    const int first = part.first / kThinStep;
+    const int count = std::min(first + kPartThinRows, rows) - first;
+    lane.left_rows.restart();
+    lane.right_rows.restart();
+    std::array<CensusPair, kHeldRows> looked_at;
+    int taken = -1;  // the last row whose words are held
+    std::size_t held = 0;
+    for (int j = 0; j < count + kThinRows - 1; ++j) {
+        const int row = std::clamp(first - kThinRowsBefore + j, 0, rows - 1);
+        if (row != taken) {
+            held = static_cast<std::size_t>(j);
+            lane.take_census(left, right, kThinStep * row, lane.held[held]);
+            taken = row;
+        }
+        looked_at[static_cast<std::size_t>(j)] = lane.held[held];
+    }
+    const int blocks = whole_blocks(width_);
+    const int lowest = kDisparityOne * config_.min_disparity;
+    const int highest = lowest + kDisparityOne * (config_.disparities - 1);
+    for (int r = 0; r < count; ++r) {
+        const std::int16_t* const coarse = coarse_map_.disparity_q4.row(kThinStep * (first + r) / 2);
+        std::uint8_t* const predicted = lane.predicted.row(r);
+        for (int x = 0; x < blocks; ++x) {
+            const int q4 = std::clamp(2 * coarse[std::min(x, width_ - 1) / 2], lowest, highest);
+            predicted[x] = static_cast<std::uint8_t>((q4 - lowest + kDisparityOne / 2) >> 4);
+        }
+    }
+    for (int x = 0; x < width_; x += kBlock)
+        kernels::thin_block({.rows = looked_at.data(),
+                             .count = count,
+                             .first_x = x,
+                             .width = width_,
+                             .min_disparity = config_.min_disparity,
+                             .disparities = config_.disparities,
+                             .predicted = lane.predicted.data + x,
+                             .predicted_stride = lane.predicted.stride,
+                             .nearer = thin_.row(first) + x,
+                             .nearer_stride = thin_.stride});
+}
+
+void PyramidMatcher::refine(ConstLuma left, ConstLuma right, const Part& part, Lane& lane,
+                            const DisparityMap& out) const {
+    lane.left_rows.restart();
+    lane.right_rows.restart();
+    const auto held = [&](int y) {
+        return lane.held[static_cast<std::size_t>(std::clamp(y, 0, height_ - 1) % kHeldRows)];
+    };
+    int next = std::max(0, part.first - kFineWindowReach);
+    for (int y = part.first; y < part.last; y += kFineRows) {
+        for (; next <= std::min(y + kFineRows - 1 + kFineWindowReach, height_ - 1); ++next)
+            lane.take_census(left, right, next, held(next));
+        predict(y, lane);
+        kernels::FineBlock block{};
+        block.width = width_;
+        block.min_disparity = config_.min_disparity;
+        block.disparities = config_.disparities;
+        for (int j = 0; j < static_cast<int>(block.rows.size()); ++j)
+            block.rows[static_cast<std::size_t>(j)] = held(y + j - kFineWindowReach);
+        for (int x = 0; x < width_; x += kBlock) {
+            block.first_x = x;
+            for (std::size_t j = 0; j < block.predicted_low.size(); ++j) {
+                block.predicted_low[j] = lane.predicted_low[j].data() + x;
+                block.predicted_index[j] = lane.predicted_index[j].data() + x;
+            }
+            for (std::size_t j = 0; j < block.winners.size(); ++j) {
+                const kernels::CensusWinners& row = lane.winners[j];
+                block.winners[j] = {row.index + x, row.best + x, row.lower + x,
+                                    row.upper + x, nullptr,      nullptr};
+            }
+            kernels::fine_block(block);
+        }
+        for (int r = 0; r < std::min(kFineRows, part.last - y); ++r) {
+            if (config_.checks)
+                judge_windows(left, left, y + r, y + r == part.first, config_.limits, lane.window_columns,
+                              out.invalid.row(y + r));
+            answer(y + r, lane, out);
+        }
+    }
+}
+
+// Predictions of the strip of kFineRows rows from y on.
+void PyramidMatcher::predict(int y, Lane& lane) const {
+    const int blocks = whole_blocks(width_);
+    const int lowest = kDisparityOne * config_.min_disparity;
+    const int highest = lowest + kDisparityOne * (config_.disparities - 1);
+    for (int j = 0; j < kFineRows / 2; ++j) {
+        const int row = std::min(y + 2 * j, height_ - 1);
+        const std::int16_t* const coarse = coarse_map_.disparity_q4.row(row / 2);
+        const std::uint8_t* const thin = thin_.row(row / kThinStep);
+        std::uint8_t* const low = lane.predicted_low[static_cast<std::size_t>(j)].data();
+        std::uint8_t* const index = lane.predicted_index[static_cast<std::size_t>(j)].data();
+        const auto put = [&](int x, int from) {
+            const int predicted = std::clamp(2 * coarse[from / 2], lowest, highest);
+            const int q4 = thin[from] != 0 ? lowest + kDisparityOne * thin[from] : predicted;
+            low[x] = static_cast<std::uint8_t>(q4);
+            index[x] = static_cast<std::uint8_t>((q4 - lowest + kDisparityOne / 2) >> 4);
+        };
+        for (int x = 0; x < width_; ++x)
+            put(x, x);
+        for (int x = width_; x < blocks; ++x)
+            put(x, width_ - 1);
+    }
+}
+
+void PyramidMatcher::answer(int y, Lane& lane, const DisparityMap& out) const {
+    kernels::CensusWinners winners = lane.winners[static_cast<std::size_t>(y % kFineRows)];
+    winners.at_right = lane.at_right.data();
+    const CheckLimits& limits = config_.limits;
+    const int last = config_.disparities - 1;
+    Invalid* const invalid = out.invalid.row(y);
+    if (config_.checks) {
+        const Invalid* const against = coarse_map_.invalid.row(y / 2);
+        const std::uint8_t* const thin = thin_.row(y / kThinStep);
+        for (int x = 0; x < width_; ++x) {
+            const Invalid coarse = thin[x] != 0 ? Invalid::kNone : against[x / 2];
+            invalid[x] = invalid[x] != Invalid::kNone ? invalid[x] : coarse;
+        }
+        if (limits.left_right_px >= 0) {
+            std::fill(lane.at_right.begin(), lane.at_right.end(), std::uint16_t{0xFFFF});
+            for (int x = 0; x < width_; ++x) {
+                const int index = winners.index[x];
+                std::uint16_t& there = winners.at_right[x - index + last];
+                there = std::min(there, static_cast<std::uint16_t>(winners.best[x] << 8 | (255 - index)));
+            }
+        }
+    }
+    kernels::census_answer_row({.width = width_,
+                                .min_disparity = config_.min_disparity,
+                                .disparities = config_.disparities,
+                                .subpixel = limits.subpixel,
+                                .checks = config_.checks,
+                                .keep = false,
+                                .uniqueness_percent = -1,
+                                .left_right_px = limits.left_right_px,
+                                .at_right = lane.right_index.data()},
+                               winners, out.disparity_q4.row(y), invalid);
+}
+
+}  // namespace groundline::stereo
