@@ -7,62 +7,102 @@
 
 #include "stereo/local_mean.hpp"
 #include "stereo/median.hpp"
+#include "stereo/paper_judge.hpp"
 #include "stereo/paper_kernels.hpp"
-#include "stereo/subpixel.hpp"
 #include "stereo/window_sums.hpp"
 
 namespace groundline::stereo {
 namespace {
 
+using kernels::ConstCostRows;
 using kernels::Cost;
+using kernels::CostRows;
+using kernels::kGroup;
 using kernels::kNoCost;
+using kernels::row_range;
 
-// Elements in front of and behind each row, room for the repeated border that the windows read.
-constexpr int kPad = 32;
 // Rows that one normalising task writes; it reads 14 more.
 constexpr int kNormaliseRows = 64;
+// Rows above and below that one rule reads, and both.
+constexpr int kRuleRows = 1;
+constexpr int kRulesRows = 2 * kRuleRows;
+constexpr int kHaloRows = kWindowReach + kRulesRows;
 
-Cost* row_of(ImageView<Cost> plane, int y) {
-    return plane.row(y) + kPad;
-}
-
-void repeat_border(Cost* row, int width) {
-    row[-1] = row[0];
-    row[width] = row[width - 1];
+// What lies above the picture's first row and below its last is a copy of that row, its border included.
+// Row `top` of `rows` is the picture's row 0, row `bottom` its last; negative: not among `rows`.
+void repeat_edges(CostRows rows, int top, int bottom) {
+    const auto copy = [&](int from, int to) {
+        std::copy_n(rows.row(from) - 1, rows.width + 2, rows.row(to) - 1);
+    };
+    if (top >= 0) copy(top, top - 1);
+    if (bottom >= 0) copy(bottom, bottom + 1);
 }
 
 }  // namespace
 
-// Memory of one running task, B rows a band. About 33 bytes a pixel of the band: 16 rows of a 640 px picture
-// take 0.37 MB and stay in the second cache.
+// Memory of one running task, B rows a band. About 45 bytes a pixel of the band, 60 with checks: 24 rows of
+// a 640 px picture take 0.9 MB and stay in a second cache of 1 MB.
 struct PaperMatcher::Lane {
-    Luma differences;                           // B + 14 rows: 5 for the window, 1 for each rule
-    std::span<std::uint16_t> weighed;           // one row, padded
-    std::array<ImageView<Cost>, 3> aggregated;  // B + 4 rows of three disparities, padded
-    std::span<std::uint16_t> columns;           // one row
-    std::array<ImageView<Cost>, 2> refined;     // after rule 1: B + 2 rows of two disparities, padded
-    std::span<Cost> enhanced;                   // after rule 2: one row
-    ImageView<Cost> best, before, second, lower, centre, upper, best_right;  // B rows each
-    ImageView<std::int16_t> index, index_right;
+    Luma left, right;                          // B + 14 rows: 5 for the window, 1 for each rule
+    std::span<std::uint8_t> outside;           // 255 outside the right image, columns like a row of `right`
+    CostRows weighed;                          // B + 4 rows
+    std::array<CostRows, 3> aggregated;        // B + 4 rows of three disparities
+    std::array<CostRows, kGroup + 1> refined;  // after rule 1: B + 2 rows of a group and the one before
+    std::array<CostRows, kGroup> enhanced;     // after rule 2: B rows of a group
+    kernels::Winners winners;                  // B rows
+    CostRows best_right;
+    ImageView<std::int16_t> index_right;
+    std::span<std::uint16_t> columns;    // for the local mean
+    std::span<std::int16_t> seen_right;  // one row
     WindowColumns window_columns;
 
+    CostRows aggregated_at(int k) const { return aggregated[static_cast<std::size_t>(k % 3)]; }
+    CostRows refined_at(int k) const { return refined[static_cast<std::size_t>(k % (kGroup + 1))]; }
+    CostRows enhanced_at(int k) const { return enhanced[static_cast<std::size_t>(k % kGroup)]; }
+
     Lane(const MatcherConfig& config, int width, int band_rows, Arena& arena) {
-        const auto row_size = static_cast<std::size_t>(width + 2 * kPad);
-        differences = arena.image<std::uint8_t>(width, band_rows + 14);
-        weighed = arena.take<std::uint16_t>(row_size);
-        for (auto& plane : aggregated)
-            plane = arena.image<Cost>(width + 2 * kPad, band_rows + 4);
-        columns = arena.take<std::uint16_t>(row_size);
-        for (auto& plane : refined)
-            plane = arena.image<Cost>(width + 2 * kPad, band_rows + 2);
-        enhanced = arena.take<Cost>(row_size);
-        best = arena.image<Cost>(width, band_rows);
-        index = arena.image<std::int16_t>(width, band_rows);
+        const int nearest = std::max(0, config.min_disparity + config.disparities - 1);
+        const int beyond = std::max(0, -config.min_disparity);
+        const int front = (nearest + 63) / 64 * 64;
+        left = arena.image<std::uint8_t>(width, band_rows + 2 * kHaloRows);
+        const Luma whole = arena.image<std::uint8_t>(front + width + beyond, band_rows + 2 * kHaloRows);
+        right = {whole.data + front, width, whole.height, whole.stride};
+        const std::span<std::uint8_t> all = arena.take<std::uint8_t>(static_cast<std::size_t>(whole.stride));
+        std::fill(all.begin(), all.end(), std::uint8_t{255});
+        outside = all.subspan(static_cast<std::size_t>(front));
+        std::fill_n(outside.begin(), width, std::uint8_t{0});
+
+        if (config.normalise_local_mean)
+            columns = arena.take<std::uint16_t>(static_cast<std::size_t>(local_mean_scratch(width)));
+        weighed = kernels::cost_rows(arena, width, band_rows + 2 * kRulesRows);
+        for (CostRows& rows : aggregated)
+            rows = kernels::cost_rows(arena, width, band_rows + 2 * kRulesRows);
+        for (CostRows& rows : refined)
+            rows = kernels::cost_rows(arena, width, band_rows + 2 * kRuleRows);
+        for (CostRows& rows : enhanced) {
+            rows = kernels::cost_rows(arena, width, band_rows, beyond, nearest);
+            fill_pixels(ImageView<Cost>(rows.data - beyond, beyond + width + nearest + kernels::kMargin,
+                                        band_rows, rows.stride),
+                        kNoCost);
+        }
+        winners.best = arena.image<Cost>(width, band_rows);
+        winners.index = arena.image<std::int16_t>(width, band_rows);
         if (!config.checks) return;
-        for (ImageView<Cost>* plane : {&before, &second, &lower, &centre, &upper, &best_right})
-            *plane = arena.image<Cost>(width, band_rows);
+        for (CostRows* rows :
+             {&winners.before, &winners.second, &winners.lower, &winners.centre, &winners.upper, &best_right})
+            *rows = arena.image<Cost>(width, band_rows);
         index_right = arena.image<std::int16_t>(width, band_rows);
+        seen_right = arena.take<std::int16_t>(static_cast<std::size_t>(width));
         window_columns = WindowColumns(width, arena);
+    }
+
+    // The views' rows that the band first .. last - 1 needs, those outside the picture repeated.
+    void take_rows(ConstLuma from_left, ConstLuma from_right, int first, int last) {
+        for (int y = first - kHaloRows; y < last + kHaloRows; ++y) {
+            const int from = std::clamp(y, 0, from_left.height - 1);
+            std::copy_n(from_left.row(from), left.width, left.row(y - first + kHaloRows));
+            std::copy_n(from_right.row(from), right.width, right.row(y - first + kHaloRows));
+        }
     }
 };
 
@@ -122,7 +162,7 @@ void PaperMatcher::match(ConstLuma left, ConstLuma right, const DisparityMap& ou
             if (config_.checks)
                 judge_row(pair, y, y == first, y - first, lane, out);
             else
-                answer_row(lane.index.row(y - first), y, out);
+                answer_row(lane.winners.index.row(y - first), y, out);
         }
     });
     if (!speckles_.patches.empty()) remove_speckles(out, config_.limits.speckle_px, speckles_);
@@ -130,92 +170,77 @@ void PaperMatcher::match(ConstLuma left, ConstLuma right, const DisparityMap& ou
 }
 
 // Leaves the winners of rows first .. last - 1 in the lane. Disparities pass one at a time; rule 1 needs the
-// next one, so it and what follows run one behind.
+// next one, so it and what follows run one behind. The winners are kept group by group.
 void PaperMatcher::search(const Pair& pair, int first, int last, Lane& lane) const {
     const int count = config_.disparities;
-    fill_pixels(lane.best, kNoCost);
+    const int rows = last - first;
+    fill_pixels(lane.winners.best, kNoCost);
     if (config_.checks)
-        for (const ImageView<Cost>& plane : {lane.before, lane.second, lane.best_right})
+        for (const CostRows& plane : {lane.winners.before, lane.winners.second, lane.best_right})
             fill_pixels(plane, kNoCost);
-    aggregate(pair, 0, first, last, lane);
+    lane.take_rows(pair.left, pair.right, first, last);
+    aggregate(0, first, last, lane);
     for (int k = 0; k < count; ++k) {
-        if (k + 1 < count) aggregate(pair, k + 1, first, last, lane);
-        refine_and_select(k, first, last, lane);
+        if (k + 1 < count) aggregate(k + 1, first, last, lane);
+        refine(k, first, last, lane);
+        if ((k + 1) % kGroup == 0) select(k + 1 - kGroup, rows, lane);
     }
 }
 
-// Fills lane.aggregated[k % 3]; its row 0 is picture row max(0, first - 2).
-void PaperMatcher::aggregate(const Pair& pair, int k, int first, int last, Lane& lane) const {
-    const int top = std::max(0, first - 2);
-    const int bottom = std::min(height_, last + 2);
-    const int top_difference = std::max(0, top - kWindowReach);
-    const int bottom_difference = std::min(height_, bottom + kWindowReach);
-    for (int y = top_difference; y < bottom_difference; ++y)
-        kernels::truncated_differences(pair.left.row(y), pair.right.row(y), width_, config_.min_disparity + k,
-                                       config_.paper.truncation, lane.differences.row(y - top_difference));
-    std::uint16_t* const weighed = lane.weighed.data() + kPad;
-    for (int y = top; y < bottom; ++y) {
-        std::array<const std::uint8_t*, 2 * kWindowReach + 1> rows;
-        for (int j = 0; j < static_cast<int>(rows.size()); ++j)
-            rows[static_cast<std::size_t>(j)] =
-                lane.differences.row(std::clamp(y + j - kWindowReach, 0, height_ - 1) - top_difference);
-        kernels::weigh_down(rows, taps_, width_, weighed);
-        for (int i = 1; i <= kWindowReach; ++i) {
-            weighed[-i] = weighed[0];
-            weighed[width_ - 1 + i] = weighed[width_ - 1];
-        }
-        Cost* const out = row_of(lane.aggregated[static_cast<std::size_t>(k % 3)], y - top);
-        kernels::weigh_across(weighed, taps_, width_, out);
-        repeat_border(out, width_);
-    }
+// Fills lane.aggregated_at(k); its row 0 is picture row first - 2.
+void PaperMatcher::aggregate(int k, int first, int last, Lane& lane) const {
+    const int rows = last - first + 2 * kRulesRows;
+    const int disparity = config_.min_disparity + k;
+    ConstLuma right = row_range(lane.right, 0, rows + 2 * kWindowReach);
+    right.data -= disparity;
+    const CostRows weighed = row_range(lane.weighed, 0, rows);
+    const CostRows out = row_range(lane.aggregated_at(k), 0, rows);
+    kernels::weigh_down(
+        {row_range(lane.left, 0, rows + 2 * kWindowReach), right, lane.outside.data() - disparity},
+        config_.paper.truncation, taps_, weighed);
+    kernels::weigh_across(weighed, taps_, out);
+    repeat_edges(out, first == 0 ? kRulesRows : -1, last == height_ ? rows - 1 - kRulesRows : -1);
 }
 
-void PaperMatcher::refine_and_select(int k, int first, int last, Lane& lane) const {
-    const int top = std::max(0, first - 2);  // of the aggregated planes
-    const int top_refined = std::max(0, first - 1);
-    const int bottom_refined = std::min(height_, last + 1);
-    const auto aggregated = [&](int disparity, int y) {
-        return row_of(lane.aggregated[static_cast<std::size_t>(disparity % 3)],
-                      std::clamp(y, 0, height_ - 1) - top);
-    };
-    const auto refined = [&](int disparity, int y) {
-        return row_of(lane.refined[static_cast<std::size_t>(disparity % 2)],
-                      std::clamp(y, 0, height_ - 1) - top_refined);
-    };
+// Fills lane.refined_at(k), its row 0 being picture row first - 1, and lane.enhanced_at(k).
+void PaperMatcher::refine(int k, int first, int last, Lane& lane) const {
     const PaperReading& reading = config_.paper;
+    const int rows = last - first;
     const int farther = k > 0 ? k - 1 : k + 1;
     const int nearer = k + 1 < config_.disparities ? k + 1 : k - 1;
-    for (int y = top_refined; y < bottom_refined; ++y) {
-        const kernels::Rows rows{aggregated(k, y - 1), aggregated(k, y), aggregated(k, y + 1)};
-        Cost* const out = refined(k, y);
-        kernels::rule_one(reading.rule_one, rows, aggregated(farther, y), aggregated(nearer, y), width_,
-                          lane.columns.data(), out);
-        repeat_border(out, width_);
+    const auto aggregated = [&](int disparity) {
+        return row_range(lane.aggregated_at(disparity), 0, rows + 2 * kRulesRows);
+    };
+    const CostRows refined = row_range(lane.refined_at(k), 0, rows + 2 * kRuleRows);
+    kernels::rule_one(reading.rule_one, aggregated(k), aggregated(farther), aggregated(nearer), refined);
+    repeat_edges(refined, first == 0 ? kRuleRows : -1, last == height_ ? rows : -1);
+
+    const CostRows looked_at =
+        reading.rules_at_once ? row_range(aggregated(k), kRuleRows, rows + 2 * kRuleRows) : refined;
+    kernels::rule_two(reading.rule_two, reading.rule_one == RuleOne::kSum9, looked_at,
+                      row_range(refined, kRuleRows, rows), row_range(lane.enhanced_at(k), 0, rows));
+}
+
+// Takes disparities k .. k + 3 into the winners.
+void PaperMatcher::select(int k, int rows, Lane& lane) const {
+    const auto refined_at = [&](int disparity) {
+        return row_range(lane.refined_at(disparity), kRuleRows, rows);
+    };
+    kernels::Group enhanced;
+    kernels::Group refined;
+    for (int i = 0; i < kGroup; ++i) {
+        enhanced[static_cast<std::size_t>(i)] = row_range(lane.enhanced_at(k + i), 0, rows);
+        refined[static_cast<std::size_t>(i)] = refined_at(k + i);
     }
-    const bool sums = reading.rule_one == RuleOne::kSum9;
-    Cost* const enhanced = lane.enhanced.data();
-    for (int y = first; y < last; ++y) {
-        kernels::Rows looked_at{refined(k, y - 1), refined(k, y), refined(k, y + 1)};
-        if (reading.rules_at_once) looked_at = {aggregated(k, y - 1), aggregated(k, y), aggregated(k, y + 1)};
-        kernels::rule_two(reading.rule_two, sums, looked_at, refined(k, y), width_, enhanced);
-        const int row = y - first;
-        kernels::Winners winners{
-            lane.best.row(row), lane.index.row(row), nullptr, nullptr, nullptr, nullptr, nullptr};
-        if (!config_.checks) {
-            kernels::select(enhanced, k, width_, winners);
-            continue;
-        }
-        winners.before = lane.before.row(row);
-        winners.second = lane.second.row(row);
-        winners.lower = lane.lower.row(row);
-        winners.centre = lane.centre.row(row);
-        winners.upper = lane.upper.row(row);
-        const Cost* const refined_before = k > 0 ? refined(k - 1, y) : refined(k, y);
-        kernels::select_with_evidence(enhanced, refined(k, y), refined_before, k, width_, winners);
-        if (config_.limits.left_right_px >= 0)
-            kernels::select_right(enhanced, k, config_.min_disparity + k, width_, lane.best_right.row(row),
-                                  lane.index_right.row(row));
+    const kernels::Winners winners = lane.winners.first_rows(rows);
+    if (!config_.checks) {
+        kernels::select(enhanced, k, winners);
+        return;
     }
+    kernels::select_with_evidence(enhanced, refined_at(std::max(0, k - 1)), refined, k, winners);
+    if (config_.limits.left_right_px >= 0)
+        kernels::select_right(enhanced, k, config_.min_disparity + k, row_range(lane.best_right, 0, rows),
+                              row_range(lane.index_right, 0, rows));
 }
 
 void PaperMatcher::answer_row(const std::int16_t* index, int y, const DisparityMap& out) const {
@@ -234,40 +259,12 @@ void PaperMatcher::judge_row(const Pair& pair, int y, bool fresh, int row, Lane&
     Invalid* const invalid = out.invalid.row(y);
     judge_windows(pair.given_left, pair.left, y, fresh, limits, lane.window_columns, invalid);
 
-    const int last = config_.disparities - 1;
-    const int highest_cost = limits.cost_percent * 256 * config_.paper.truncation;
-    const std::int16_t* const index = lane.index.row(row);
-    const Cost* const best = lane.best.row(row);
-    const Cost* const second = lane.second.row(row);
-    const Cost* const centre = lane.centre.row(row);
-    const std::int16_t* const index_right = lane.index_right.row(row);
-    const auto judge = [&](int x) {
-        const int k = index[x];
-        const int match = x - config_.min_disparity - k;
-        if (invalid[x] != Invalid::kNone) return invalid[x];
-        if (match <= 0 || match >= width_) return Invalid::kBorder;
-        if (k == last) return Invalid::kRangeEdge;
-        if (limits.cost_percent < 100 && 100 * centre[x] > highest_cost) return Invalid::kCost;
-        if (limits.uniqueness_percent >= 0 &&
-            (second[x] == best[x] ||
-             100 * (second[x] - limits.uniqueness_floor) < (100 + limits.uniqueness_percent) * best[x]))
-            return Invalid::kUniqueness;
-        if (limits.left_right_px >= 0 && std::abs(index_right[match] - k) > limits.left_right_px)
-            return Invalid::kLeftRight;
-        return Invalid::kNone;
-    };
-    const Cost* const lower = lane.lower.row(row);
-    const Cost* const upper = lane.upper.row(row);
-    for (int x = 0; x < width_; ++x) {
-        invalid[x] = judge(x);
-        disparity[x] = 0;
-        if (invalid[x] != Invalid::kNone) continue;
-        const int k = index[x];
-        const bool refine = limits.subpixel && k > 0 && k < last;
-        disparity[x] =
-            static_cast<std::int16_t>(kDisparityOne * (config_.min_disparity + k) +
-                                      (refine ? equiangular_q4(lower[x], centre[x], upper[x]) : 0));
-    }
+    const kernels::Winners& winners = lane.winners;
+    const WinnerRow kept{winners.index.row(row),   winners.best.row(row),   winners.second.row(row),
+                         winners.lower.row(row),   winners.centre.row(row), winners.upper.row(row),
+                         lane.index_right.row(row)};
+    const SearchRange range{width_, config_.min_disparity, config_.disparities, config_.paper.truncation};
+    judge_winners(kept, range, limits, lane.seen_right.data(), invalid, disparity);
 }
 
 }  // namespace groundline::stereo

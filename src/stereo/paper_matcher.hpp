@@ -13,7 +13,7 @@ namespace groundline::stereo {
 class PaperMatcher final : public Matcher {
   public:
     // Rows that one task matches. Fixed, so that the split into tasks follows from the image height alone.
-    static constexpr int kBandRows = 16;
+    static constexpr int kBandRows = 24;
 
     // Configuration as checked by make_matcher. `band_rows` >= 1 never changes the result.
     PaperMatcher(const MatcherConfig& config, int width, int height, int lanes, Arena& arena,
@@ -30,8 +30,9 @@ class PaperMatcher final : public Matcher {
     struct Pair;
 
     void search(const Pair& pair, int first, int last, Lane& lane) const;
-    void aggregate(const Pair& pair, int k, int first, int last, Lane& lane) const;
-    void refine_and_select(int k, int first, int last, Lane& lane) const;
+    void aggregate(int k, int first, int last, Lane& lane) const;
+    void refine(int k, int first, int last, Lane& lane) const;
+    void select(int k, int rows, Lane& lane) const;
     void answer_row(const std::int16_t* index, int y, const DisparityMap& out) const;
     void judge_row(const Pair& pair, int y, bool fresh, int row, Lane& lane, const DisparityMap& out) const;
 

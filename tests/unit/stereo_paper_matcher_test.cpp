@@ -3,6 +3,7 @@
 
 #include "core/error.hpp"
 #include "support/allocation_count.hpp"
+#include "support/vector_units.hpp"
 #include "unit/stereo_test_tools.hpp"
 
 namespace groundline::stereo {
@@ -15,51 +16,75 @@ struct Size {
     int height;
 };
 
+// What a configuration makes of a pair, stated plainly.
+struct Expectation {
+    MatcherConfig config;
+    const OwnedPair* pair;
+    OwnedResult plain;
+
+    Expectation(const MatcherConfig& with, const OwnedPair& of)
+        : config(with), pair(&of), plain(match_plain(with, of.left.view(), of.right.view())) {}
+};
+
+void expect_on_every_vector_unit(const std::vector<Expectation>& expectations) {
+    on_every_vector_unit([&] {
+        for (const Expectation& expected : expectations) {
+            const MatcherConfig& config = expected.config;
+            const PaperReading& reading = config.paper;
+            const ConstLuma left = expected.pair->left.view();
+            EXPECT_EQ(differing_pixels(match_fast(config, left, expected.pair->right.view()), expected.plain),
+                      0)
+                << left.width << "x" << left.height << " stride " << left.stride << " from "
+                << config.min_disparity << " rules " << static_cast<int>(reading.rule_one)
+                << static_cast<int>(reading.rule_two) << " at once " << reading.rules_at_once << " window "
+                << static_cast<int>(reading.window) << " truncation " << reading.truncation << " checks "
+                << config.checks << " normalise " << config.normalise_local_mean;
+        }
+    });
+}
+
 TEST(PaperMatcher, C7_EqualsThePlainFormInEveryReading) {
     const OwnedPair pair = stepped_pair(97, 41, 100);
+    std::vector<Expectation> expectations;
     for (const bool checks : {false, true})
         for (const PaperReading& reading : all_readings()) {
             MatcherConfig config = pure(32);
             config.checks = checks;
             config.limits.speckle_px = 20;
             config.paper = reading;
-            EXPECT_EQ(differing_pixels(match_fast(config, pair.left.view(), pair.right.view()),
-                                       match_plain(config, pair.left.view(), pair.right.view())),
-                      0)
-                << "rules " << static_cast<int>(reading.rule_one) << static_cast<int>(reading.rule_two)
-                << " at once " << reading.rules_at_once << " window " << static_cast<int>(reading.window)
-                << " truncation " << reading.truncation << " checks " << checks;
+            expectations.emplace_back(config, pair);
         }
+    expect_on_every_vector_unit(expectations);
 }
 
 TEST(PaperMatcher, C7_EqualsThePlainFormAtOddSizesAndStrides) {
+    std::vector<OwnedPair> pairs;
     for (const Size size : {Size{17, 11}, Size{65, 33}, Size{97, 41}, Size{130, 77}})
         for (const int extra : {0, 5})
-            for (const bool normalise : {false, true}) {
-                MatcherConfig config;
-                config.disparities = size.width > 64 ? 64 : 16;
-                config.normalise_local_mean = normalise;
-                const OwnedPair pair = stepped_pair(size.width, size.height, 101, 0, extra);
-                const OwnedResult fast = match_fast(config, pair.left.view(), pair.right.view());
-                EXPECT_EQ(differing_pixels(fast, match_plain(config, pair.left.view(), pair.right.view())), 0)
-                    << size.width << "x" << size.height << " extra " << extra << " normalise " << normalise;
-            }
+            pairs.push_back(stepped_pair(size.width, size.height, 101, 0, extra));
+    std::vector<Expectation> expectations;
+    for (const OwnedPair& pair : pairs)
+        for (const bool normalise : {false, true}) {
+            MatcherConfig config;
+            config.disparities = pair.left.width() > 64 ? 64 : 16;
+            config.normalise_local_mean = normalise;
+            expectations.emplace_back(config, pair);
+        }
+    expect_on_every_vector_unit(expectations);
 }
 
 TEST(PaperMatcher, C7_EqualsThePlainFormOnPureNoiseAndAtEveryOffset) {
-    for (const int offset : {-40, -9, 0, 6, 30}) {
+    const OwnedPair pair{test::noise_image(83, 37, 102), test::noise_image(83, 37, 103)};
+    std::vector<Expectation> expectations;
+    for (const int offset : {-82, -40, -9, 0, 6, 30, 50}) {
         MatcherConfig config;
         config.min_disparity = offset;
         config.disparities = 32;
         config.limits.speckle_px = 3;
         config.limits.median = offset > 0;
-        const auto left = test::noise_image(83, 37, 102);
-        const auto right = test::noise_image(83, 37, 103);
-        EXPECT_EQ(differing_pixels(match_fast(config, left.view(), right.view()),
-                                   match_plain(config, left.view(), right.view())),
-                  0)
-            << "offset " << offset;
+        expectations.emplace_back(config, pair);
     }
+    expect_on_every_vector_unit(expectations);
 }
 
 // Limits in the middle of what the scene has, so that each test decides both ways.
