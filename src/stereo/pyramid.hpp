@@ -23,7 +23,7 @@ inline constexpr int kThinRows = 8;
 inline constexpr int kThinNearer = 4;
 inline constexpr int kThinPredictedWithin = 2;  // px around the prediction that count as predicted
 inline constexpr int kThinHighest = 79;         // of 255: 30 percent of the bits differ
-inline constexpr int kFineReachQ4 = 24;
+inline constexpr int kFineReachQ4 = 16;
 inline constexpr int kFineWindowReach = 3;
 
 // Bits of the census word whose pairs reach at most 2 px to the side.

@@ -159,8 +159,8 @@ class Pyramid {
             int lowest = 256;
             for (int k = last_; k >= 0; --k) {
                 const int x = match + config_.min_disparity + k;
-                if (x < 0 || x >= left_.width || winner[static_cast<std::size_t>(x)] != k ||
-                    cost[static_cast<std::size_t>(x)] >= lowest)
+                if (x < 0 || x >= left_.width || prediction_.against[index(x, y)] != Invalid::kNone ||
+                    winner[static_cast<std::size_t>(x)] != k || cost[static_cast<std::size_t>(x)] >= lowest)
                     continue;
                 best = k;
                 lowest = cost[static_cast<std::size_t>(x)];

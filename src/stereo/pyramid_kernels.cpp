@@ -132,26 +132,89 @@ void ThinBlockAny(const ThinBlock& block) {
     }
 }
 
+void PredictRowAny(const PredictRow& row, const Prediction& out) {
+    const hn::Full128<std::int16_t> d;
+    const hn::Full64<std::uint8_t> d8;
+    const int lowest = kDisparityOne * row.min_disparity;
+    const auto least = hn::Set(d, static_cast<std::int16_t>(lowest));
+    const auto most = hn::Set(d, static_cast<std::int16_t>(lowest + kDisparityOne * (row.disparities - 1)));
+    const auto half = hn::Set(d, kDisparityOne / 2);
+    const auto low_byte = hn::Set(d, 255);
+    const auto none = hn::Zero(d);
+    const auto put = [&](auto q4, auto against, int x) HWY_ATTR {
+        q4 = hn::Min(hn::Max(hn::ShiftLeft<1>(q4), least), most);
+        if (row.thin != nullptr) {
+            const auto thin = hn::PromoteTo(d, hn::LoadU(d8, row.thin + x));
+            const auto found = hn::Gt(thin, none);
+            q4 = hn::IfThenElse(found, hn::Add(hn::ShiftLeft<4>(thin), least), q4);
+            against = hn::IfThenZeroElse(found, against);
+        }
+        hn::StoreU(hn::DemoteTo(d8, hn::And(q4, low_byte)), d8, out.low + x);
+        const auto index = hn::ShiftRight<4>(hn::Add(hn::Sub(q4, least), half));
+        hn::StoreU(hn::DemoteTo(d8, index), d8, out.index + x);
+        hn::StoreU(hn::DemoteTo(d8, against), d8, reinterpret_cast<std::uint8_t*>(out.against) + x);
+    };
+    for (int x = 0; x < row.width; x += 16) {
+        const auto q4 = hn::LoadU(d, row.disparity_q4 + x / 2);
+        const auto against =
+            hn::PromoteTo(d, hn::LoadU(d8, reinterpret_cast<const std::uint8_t*>(row.invalid) + x / 2));
+        put(hn::InterleaveLower(d, q4, q4), hn::InterleaveLower(d, against, against), x);
+        put(hn::InterleaveUpper(d, q4, q4), hn::InterleaveUpper(d, against, against), x + 8);
+    }
+    const int blocks = (row.width + kBlock - 1) / kBlock * kBlock;
+    const auto rest = static_cast<std::size_t>(blocks - row.width);
+    std::memset(out.low + row.width, out.low[row.width - 1], rest);
+    std::memset(out.index + row.width, out.index[row.width - 1], rest);
+    std::memset(out.against + row.width, static_cast<int>(out.against[row.width - 1]), rest);
+}
+
+void VoteRowAny(int width, int disparities, const std::uint8_t* against, const CensusWinners& winners,
+                std::uint16_t* keys, std::uint8_t* invalid) {
+    const D d;
+    for (int x = 0; x < width; x += kLanes) {
+        const V known = hn::LoadU(d, invalid + x);
+        hn::StoreU(hn::IfThenElse(hn::Eq(known, hn::Zero(d)), hn::LoadU(d, against + x), known), d,
+                   invalid + x);
+    }
+    const hn::Half<D> d8;
+    const hn::Rebind<std::uint16_t, hn::Half<D>> d16;
+    for (int x = 0; x < width; x += kLanes / 2) {
+        const auto silent = hn::Not(hn::VecFromMask(d8, hn::Eq(hn::LoadU(d8, against + x), hn::Zero(d8))));
+        const auto best = hn::PromoteTo(d16, hn::Or(hn::LoadU(d8, winners.best + x), silent));
+        const auto rank = hn::PromoteTo(d16, hn::Not(hn::LoadU(d8, winners.index + x)));
+        hn::StoreU(hn::Or(hn::ShiftLeft<8>(best), rank), d16, keys + x);
+    }
+    std::uint16_t* const at_right = winners.at_right + disparities - 1;
+    std::fill_n(winners.at_right, width + disparities - 1, std::uint16_t{0xFFFF});
+    for (int x = 0; x < width; ++x) {
+        std::uint16_t& there = at_right[x - winners.index[x]];
+        there = std::min(there, keys[x]);
+    }
+}
+
 void FineBlockAny(const FineBlock& block) {
     const D d;
     constexpr int kWindow = 2 * kFineWindowReach + 1;
     constexpr int kMost = 256;
-    // Which indices are predicted somewhere in the block.
-    std::uint8_t predicted[kMost + 2 * 3] = {};
+    // Which indices are predicted somewhere in the block. A candidate is at most 1 away from one; its
+    // neighbours, at most 2 away, are needed for the sub-pixel fit.
+    constexpr int kReach = 1;
+    static_assert(kFineReachQ4 < kDisparityOne * (kReach + 1) - kDisparityOne / 2);
+    std::uint8_t predicted[kMost + 2 * (kReach + 1)] = {};
     int lowest = kMost;
-    int highest = 0;
-    for (const std::uint8_t* row : block.predicted_index)
+    int highest = -1;
+    for (const Prediction& row : block.predictions)
         for (int i = 0; i < kBlock; ++i) {
-            const int index = row[i];
-            predicted[index + 3] = 1;
+            if (block.checks && row.against[i] != Invalid::kNone) continue;
+            const int index = row.index[i];
+            predicted[index + kReach + 1] = 1;
             lowest = std::min(lowest, index);
             highest = std::max(highest, index);
         }
-    // A candidate is at most 2 away from a predicted index; its neighbours are needed for the sub-pixel fit.
     const auto near_predicted = [&](int k, int reach) {
         bool is = false;
         for (int i = -reach; i <= reach; ++i)
-            is = is || predicted[k + i + 3] != 0;
+            is = is || predicted[k + i + kReach + 1] != 0;
         return is;
     };
     const int last = block.disparities - 1;
@@ -165,10 +228,11 @@ void FineBlockAny(const FineBlock& block) {
         std::memset(row.index, 0, kBlock);
     }
     const V reach = hn::Set(d, kFineReachQ4);
-    const V two = hn::Set(d, 2);
-    for (int k = std::max(0, lowest - 3); k <= std::min(last, highest + 3) + 1; ++k) {
+    const V near = hn::Set(d, kReach);
+    const int behind = highest + kReach + 1;  // the last index needed
+    for (int k = std::max(0, lowest - kReach - 1); k <= std::min(last + 1, behind); ++k) {
         std::uint8_t* const here = costs[k % 3];
-        if (k <= last && k <= highest + 3 && near_predicted(k, 3)) {
+        if (k <= last && near_predicted(k, kReach + 1)) {
             SumColumns<kWindow, false>(block.rows.data(), kFineRows, block.first_x, block.min_disparity + k,
                                        differences, sums);
             RepeatEnds(kFineRows, block.first_x, block.width, kFineWindowReach, sums);
@@ -177,12 +241,12 @@ void FineBlockAny(const FineBlock& block) {
             for (int r = 0; r < kFineRows; ++r) {
                 const std::uint8_t* const sum = sums + r * kSpan + kBlockMargin;
                 const auto at = [&](int x) HWY_ATTR { return hn::LoadU(d, sum + x); };
-                const std::uint8_t* const low = block.predicted_low[static_cast<std::size_t>(r / 2)];
+                const std::uint8_t* const low = block.predictions[static_cast<std::size_t>(r / 2)].low;
                 for (int i = 0; i < kBlock; i += kLanes) {
                     const V outer = hn::AverageRound(hn::AverageRound(at(i - 3), at(i + 3)),
                                                      hn::AverageRound(at(i - 2), at(i + 2)));
                     const V inner = hn::AverageRound(hn::AverageRound(at(i - 1), at(i + 1)), at(i));
-                    // Right modulo 256 where it matters: up to 2.5 px from the prediction.
+                    // Right modulo 256 where it matters: up to 2 px from the prediction.
                     const hn::RebindToSigned<D> ds;
                     const V off = hn::BitCast(
                         d, hn::Abs(hn::BitCast(ds, hn::Sub(disparity_low, hn::LoadU(d, low + i)))));
@@ -192,7 +256,7 @@ void FineBlockAny(const FineBlock& block) {
         }
         // The candidates of index k - 1, now that both its neighbours are known.
         const int candidate = k - 1;
-        if (candidate < 0 || candidate > last || !near_predicted(candidate, 2)) continue;
+        if (candidate < 0 || candidate > last || !near_predicted(candidate, kReach)) continue;
         const std::uint8_t* const centre = costs[candidate % 3];
         const std::uint8_t* const below = costs[(candidate + 2) % 3];
         const V index = hn::Set(d, static_cast<std::uint8_t>(candidate));
@@ -200,13 +264,13 @@ void FineBlockAny(const FineBlock& block) {
             hn::Set(d, static_cast<std::uint8_t>(kDisparityOne * (block.min_disparity + candidate)));
         for (int r = 0; r < kFineRows; ++r) {
             const CensusWinners& out = block.winners[static_cast<std::size_t>(r)];
-            const std::uint8_t* const low = block.predicted_low[static_cast<std::size_t>(r / 2)];
-            const std::uint8_t* const at = block.predicted_index[static_cast<std::size_t>(r / 2)];
+            const std::uint8_t* const low = block.predictions[static_cast<std::size_t>(r / 2)].low;
+            const std::uint8_t* const at = block.predictions[static_cast<std::size_t>(r / 2)].index;
             for (int i = 0; i < kBlock; i += kLanes) {
                 const hn::RebindToSigned<D> ds;
                 const V off =
                     hn::BitCast(d, hn::Abs(hn::BitCast(ds, hn::Sub(disparity_low, hn::LoadU(d, low + i)))));
-                const auto is_near = AtMost(Distance(index, hn::LoadU(d, at + i)), two);
+                const auto is_near = AtMost(Distance(index, hn::LoadU(d, at + i)), near);
                 const V cost = hn::Load(d, centre + r * kBlock + i);
                 const V best = hn::LoadU(d, out.best + i);
                 const auto wins = hn::And(hn::And(is_near, AtMost(off, reach)), hn::Lt(cost, best));
@@ -229,10 +293,21 @@ HWY_AFTER_NAMESPACE();
 namespace groundline::stereo::kernels {
 
 HWY_EXPORT(ThinBlockAny);
+HWY_EXPORT(PredictRowAny);
 HWY_EXPORT(FineBlockAny);
+HWY_EXPORT(VoteRowAny);
 
 void thin_block(const ThinBlock& block) {
     HWY_DYNAMIC_DISPATCH(ThinBlockAny)(block);
+}
+void predict_row(const PredictRow& row, const Prediction& out) {
+    HWY_DYNAMIC_DISPATCH(PredictRowAny)(row, out);
+}
+void vote_row(int width, int disparities, const Invalid* against, const CensusWinners& winners,
+              std::uint16_t* keys, Invalid* invalid) {
+    HWY_DYNAMIC_DISPATCH(VoteRowAny)
+    (width, disparities, reinterpret_cast<const std::uint8_t*>(against), winners, keys,
+     reinterpret_cast<std::uint8_t*>(invalid));
 }
 void fine_block(const FineBlock& block) {
     HWY_DYNAMIC_DISPATCH(FineBlockAny)(block);

@@ -38,6 +38,24 @@ struct ThinBlock {
 };
 void thin_block(const ThinBlock& block);
 
+// The prediction of a row: what the coarse level or the thin search says.
+struct Prediction {
+    std::uint8_t* low;    // low byte of the disparity in 1/16 px
+    std::uint8_t* index;  // index nearest to it
+    Invalid* against;     // the coarse level's reason; kNone where a thin thing was found
+};
+struct PredictRow {
+    const std::int16_t* disparity_q4;  // of the coarse level, for every two pixels
+    const Invalid* invalid;
+    const std::uint8_t* thin;  // index of the nearer thing, 0: none; null: nothing was searched
+    int width;
+    int min_disparity;
+    int disparities;
+};
+// Writes whole blocks of all three; what is behind the last pixel repeats it. Reads kWidestVector bytes
+// behind its rows.
+void predict_row(const PredictRow& row, const Prediction& out);
+
 inline constexpr int kFineRows = 8;
 struct FineBlock {
     std::array<CensusPair, kFineRows + 2 * kFineWindowReach> rows;
@@ -45,13 +63,17 @@ struct FineBlock {
     int width;
     int min_disparity;
     int disparities;
-    // For each two rows, from first_x on: the low byte of the predicted disparity in 1/16 px, and the index
-    // nearest to it; readable up to a whole block.
-    std::array<const std::uint8_t*, kFineRows / 2> predicted_low;
-    std::array<const std::uint8_t*, kFineRows / 2> predicted_index;
+    bool checks;  // pixels that something speaks against may be left out
+    // For each two rows, from first_x on, whole blocks.
+    std::array<Prediction, kFineRows / 2> predictions;
     // Out, from first_x on, whole blocks: the winners, without `second` and `at_right`.
     std::array<CensusWinners, kFineRows> winners;
 };
 void fine_block(const FineBlock& block);
+
+// With the checks: adds the coarse level's reasons to those known of a row and fills winners.at_right by the
+// pixels that nothing coarse speaks against. `keys` is scratch, `width` whole vectors.
+void vote_row(int width, int disparities, const Invalid* against, const CensusWinners& winners,
+              std::uint16_t* keys, Invalid* invalid);
 
 }  // namespace groundline::stereo::kernels

@@ -69,10 +69,10 @@ struct PyramidMatcher::Lane {
     std::array<CensusPair, kHeldRows> held;  // right words at column 0
     std::ptrdiff_t before = 0;               // columns of a right row in front of column 0
     std::size_t behind = 0;                  // ... and behind the last
-    ImageView<std::uint8_t> predicted;       // thin search: index predicted, a row each
-    std::array<std::span<std::uint8_t>, kFineRows / 2> predicted_low, predicted_index;  // of a strip
+    ImageView<std::uint8_t> low, index;      // predictions, a row each
+    ImageView<Invalid> against;
     std::array<kernels::CensusWinners, kFineRows> winners{};
-    std::span<std::uint16_t> at_right;
+    std::span<std::uint16_t> at_right, keys;
     std::span<std::uint8_t> right_index;
     WindowColumns window_columns;
 
@@ -91,18 +91,19 @@ struct PyramidMatcher::Lane {
         for (CensusPair& row : held)
             row = {{plane(margin, rest), plane(margin, rest)},
                    {plane(before, behind), plane(before, behind)}};
-        predicted = arena.image<std::uint8_t>(blocks, kPartThinRows);
-        for (auto* rows : {&predicted_low, &predicted_index})
-            for (auto& row : *rows)
-                row = arena.take<std::uint8_t>(static_cast<std::size_t>(blocks));
+        low = arena.image<std::uint8_t>(blocks, kPartThinRows);
+        index = arena.image<std::uint8_t>(blocks, kPartThinRows);
+        against = arena.image<Invalid>(blocks, kPartThinRows);
         for (kernels::CensusWinners& row : winners)
             for (std::uint8_t** part : {&row.index, &row.best, &row.lower, &row.upper})
                 *part = arena.take<std::uint8_t>(static_cast<std::size_t>(blocks)).data();
         at_right = arena.take<std::uint16_t>(static_cast<std::size_t>(width + config.disparities));
+        keys = arena.take<std::uint16_t>(static_cast<std::size_t>(blocks));
         right_index = arena.take<std::uint8_t>(static_cast<std::size_t>(blocks));
         if (config.checks) window_columns = WindowColumns(width, arena);
     }
 
+    kernels::Prediction prediction(int row) const { return {low.row(row), index.row(row), against.row(row)}; }
     void take_census(ConstLuma left, ConstLuma right, int y, const CensusPair& row) {
         left_rows.take(left, y, row.left);
         right_rows.take(right, y, row.right);
@@ -178,17 +179,8 @@ void PyramidMatcher::find_thin(ConstLuma left, ConstLuma right, const Part& part
         }
         looked_at[static_cast<std::size_t>(j)] = lane.held[held];
     }
-    const int blocks = whole_blocks(width_);
-    const int lowest = kDisparityOne * config_.min_disparity;
-    const int highest = lowest + kDisparityOne * (config_.disparities - 1);
-    for (int r = 0; r < count; ++r) {
-        const std::int16_t* const coarse = coarse_map_.disparity_q4.row(kThinStep * (first + r) / 2);
-        std::uint8_t* const predicted = lane.predicted.row(r);
-        for (int x = 0; x < blocks; ++x) {
-            const int q4 = std::clamp(2 * coarse[std::min(x, width_ - 1) / 2], lowest, highest);
-            predicted[x] = static_cast<std::uint8_t>((q4 - lowest + kDisparityOne / 2) >> 4);
-        }
-    }
+    for (int r = 0; r < count; ++r)
+        predict(kThinStep * (first + r), false, lane.prediction(r));
     for (int x = 0; x < width_; x += kBlock)
         kernels::thin_block({.rows = looked_at.data(),
                              .count = count,
@@ -196,8 +188,8 @@ void PyramidMatcher::find_thin(ConstLuma left, ConstLuma right, const Part& part
                              .width = width_,
                              .min_disparity = config_.min_disparity,
                              .disparities = config_.disparities,
-                             .predicted = lane.predicted.data + x,
-                             .predicted_stride = lane.predicted.stride,
+                             .predicted = lane.index.data + x,
+                             .predicted_stride = lane.index.stride,
                              .nearer = thin_.row(first) + x,
                              .nearer_stride = thin_.stride});
 }
@@ -213,18 +205,20 @@ void PyramidMatcher::refine(ConstLuma left, ConstLuma right, const Part& part, L
     for (int y = part.first; y < part.last; y += kFineRows) {
         for (; next <= std::min(y + kFineRows - 1 + kFineWindowReach, height_ - 1); ++next)
             lane.take_census(left, right, next, held(next));
-        predict(y, lane);
+        for (int j = 0; j < kFineRows / 2; ++j)
+            predict(std::min(y + 2 * j, height_ - 1), true, lane.prediction(j));
         kernels::FineBlock block{};
         block.width = width_;
         block.min_disparity = config_.min_disparity;
         block.disparities = config_.disparities;
+        block.checks = config_.checks;
         for (int j = 0; j < static_cast<int>(block.rows.size()); ++j)
             block.rows[static_cast<std::size_t>(j)] = held(y + j - kFineWindowReach);
         for (int x = 0; x < width_; x += kBlock) {
             block.first_x = x;
-            for (std::size_t j = 0; j < block.predicted_low.size(); ++j) {
-                block.predicted_low[j] = lane.predicted_low[j].data() + x;
-                block.predicted_index[j] = lane.predicted_index[j].data() + x;
+            for (std::size_t j = 0; j < block.predictions.size(); ++j) {
+                const kernels::Prediction row = lane.prediction(static_cast<int>(j));
+                block.predictions[j] = {row.low + x, row.index + x, row.against + x};
             }
             for (std::size_t j = 0; j < block.winners.size(); ++j) {
                 const kernels::CensusWinners& row = lane.winners[j];
@@ -242,52 +236,24 @@ void PyramidMatcher::refine(ConstLuma left, ConstLuma right, const Part& part, L
     }
 }
 
-// Predictions of the strip of kFineRows rows from y on.
-void PyramidMatcher::predict(int y, Lane& lane) const {
-    const int blocks = whole_blocks(width_);
-    const int lowest = kDisparityOne * config_.min_disparity;
-    const int highest = lowest + kDisparityOne * (config_.disparities - 1);
-    for (int j = 0; j < kFineRows / 2; ++j) {
-        const int row = std::min(y + 2 * j, height_ - 1);
-        const std::int16_t* const coarse = coarse_map_.disparity_q4.row(row / 2);
-        const std::uint8_t* const thin = thin_.row(row / kThinStep);
-        std::uint8_t* const low = lane.predicted_low[static_cast<std::size_t>(j)].data();
-        std::uint8_t* const index = lane.predicted_index[static_cast<std::size_t>(j)].data();
-        const auto put = [&](int x, int from) {
-            const int predicted = std::clamp(2 * coarse[from / 2], lowest, highest);
-            const int q4 = thin[from] != 0 ? lowest + kDisparityOne * thin[from] : predicted;
-            low[x] = static_cast<std::uint8_t>(q4);
-            index[x] = static_cast<std::uint8_t>((q4 - lowest + kDisparityOne / 2) >> 4);
-        };
-        for (int x = 0; x < width_; ++x)
-            put(x, x);
-        for (int x = width_; x < blocks; ++x)
-            put(x, width_ - 1);
-    }
+void PyramidMatcher::predict(int y, bool with_thin, const kernels::Prediction& out) const {
+    kernels::predict_row({.disparity_q4 = coarse_map_.disparity_q4.row(y / 2),
+                          .invalid = coarse_map_.invalid.row(y / 2),
+                          .thin = with_thin ? thin_.row(y / kThinStep) : nullptr,
+                          .width = width_,
+                          .min_disparity = config_.min_disparity,
+                          .disparities = config_.disparities},
+                         out);
 }
 
 void PyramidMatcher::answer(int y, Lane& lane, const DisparityMap& out) const {
     kernels::CensusWinners winners = lane.winners[static_cast<std::size_t>(y % kFineRows)];
     winners.at_right = lane.at_right.data();
     const CheckLimits& limits = config_.limits;
-    const int last = config_.disparities - 1;
     Invalid* const invalid = out.invalid.row(y);
-    if (config_.checks) {
-        const Invalid* const against = coarse_map_.invalid.row(y / 2);
-        const std::uint8_t* const thin = thin_.row(y / kThinStep);
-        for (int x = 0; x < width_; ++x) {
-            const Invalid coarse = thin[x] != 0 ? Invalid::kNone : against[x / 2];
-            invalid[x] = invalid[x] != Invalid::kNone ? invalid[x] : coarse;
-        }
-        if (limits.left_right_px >= 0) {
-            std::fill(lane.at_right.begin(), lane.at_right.end(), std::uint16_t{0xFFFF});
-            for (int x = 0; x < width_; ++x) {
-                const int index = winners.index[x];
-                std::uint16_t& there = winners.at_right[x - index + last];
-                there = std::min(there, static_cast<std::uint16_t>(winners.best[x] << 8 | (255 - index)));
-            }
-        }
-    }
+    if (config_.checks)
+        kernels::vote_row(width_, config_.disparities, lane.against.row(y % kFineRows / 2), winners,
+                          lane.keys.data(), invalid);
     kernels::census_answer_row({.width = width_,
                                 .min_disparity = config_.min_disparity,
                                 .disparities = config_.disparities,

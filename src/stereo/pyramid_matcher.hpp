@@ -10,6 +10,10 @@
 
 namespace groundline::stereo {
 
+namespace kernels {
+struct Prediction;
+}
+
 class PyramidMatcher final : public Matcher {
   public:
     // Configuration as checked by make_matcher.
@@ -27,7 +31,7 @@ class PyramidMatcher final : public Matcher {
 
     void find_thin(ConstLuma left, ConstLuma right, const Part& part, Lane& lane) const;
     void refine(ConstLuma left, ConstLuma right, const Part& part, Lane& lane, const DisparityMap& out) const;
-    void predict(int y, Lane& lane) const;
+    void predict(int y, bool with_thin, const kernels::Prediction& out) const;
     void answer(int y, Lane& lane, const DisparityMap& out) const;
 
     MatcherConfig config_;
