@@ -1,6 +1,7 @@
 #include "stereo/pyramid_kernels.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 
 #undef HWY_TARGET_INCLUDE
@@ -39,12 +40,13 @@ HWY_INLINE V Differences(const CensusPair& row, int x, std::ptrdiff_t shift) {
     return hn::Add(hn::PopulationCount(low), hn::PopulationCount(high));
 }
 
-// Sums down `kRows` rows for `count` rows, over a block and its margins; row r sums rows r .. r + kRows - 1.
+// Sums down `kRows` rows for `count` rows, over columns `begin` .. `end` - 1 of a block and its margins; row
+// r sums rows r .. r + kRows - 1.
 template <int kRows, bool kNarrow>
-HWY_INLINE void SumColumns(const CensusPair* rows, int count, int first_x, std::ptrdiff_t shift,
-                           std::uint8_t* differences, std::uint8_t* sums) {
+HWY_INLINE void SumColumns(const CensusPair* rows, int count, int first_x, std::ptrdiff_t shift, int begin,
+                           int end, std::uint8_t* differences, std::uint8_t* sums) {
     const D d;
-    for (int i = 0; i < kSpan; i += kLanes) {
+    for (int i = begin; i < end; i += kLanes) {
         const int x = first_x - kBlockMargin + i;
         V sum = hn::Zero(d);
         for (int r = 0; r < kRows - 1; ++r) {
@@ -84,20 +86,24 @@ void ThinBlockAny(const ThinBlock& block) {
     std::memset(predicted, 255, sizeof predicted);
     std::memset(nearer, 255, sizeof nearer);
     const int used = std::min(kBlock, block.width - block.first_x);
+    std::array<int, kMostThinRows> farthest_of;  // of each row
     int farthest = 255;
     for (int r = 0; r < block.count; ++r) {
         const std::uint8_t* const row = block.predicted + r * block.predicted_stride;
-        farthest = std::min<int>(farthest, *std::min_element(row, row + used));
+        int& lowest = farthest_of[static_cast<std::size_t>(r)];
+        lowest = *std::min_element(row, row + used);
+        farthest = std::min(farthest, lowest);
         std::memset(block.nearer + r * block.nearer_stride, 0, kBlock);
     }
     const V within = hn::Set(d, kThinPredictedWithin);
     const V apart = hn::Set(d, kThinNearer);
     for (int k = std::max(0, farthest - kThinPredictedWithin); k < block.disparities; ++k) {
-        SumColumns<kThinRows, true>(block.rows, block.count, block.first_x, block.min_disparity + k,
+        SumColumns<kThinRows, true>(block.rows, block.count, block.first_x, block.min_disparity + k, 0, kSpan,
                                     differences, sums);
         RepeatEnds(block.count, block.first_x, block.width, 1, sums);
         const V index = hn::Set(d, static_cast<std::uint8_t>(k));
         for (int r = 0; r < block.count; ++r) {
+            if (k < farthest_of[static_cast<std::size_t>(r)] - kThinPredictedWithin) continue;
             const std::uint8_t* const row = sums + r * kSpan + kBlockMargin;
             for (int i = 0; i < kBlock; i += kLanes) {
                 if (i >= used) break;
@@ -194,27 +200,31 @@ void VoteRowAny(int width, int disparities, const std::uint8_t* against, const C
 
 void FineBlockAny(const FineBlock& block) {
     const D d;
+    constexpr int kGroup = 32;  // pixels that are skipped together
+    constexpr int kGroups = kBlock / kGroup;
+    static_assert(kGroup % kLanes == 0 && 2 * kBlockMargin % kLanes == 0);
     constexpr int kWindow = 2 * kFineWindowReach + 1;
     constexpr int kMost = 256;
     // Which indices are predicted somewhere in the block. A candidate is at most 1 away from one; its
     // neighbours, at most 2 away, are needed for the sub-pixel fit.
     constexpr int kReach = 1;
     static_assert(kFineReachQ4 < kDisparityOne * (kReach + 1) - kDisparityOne / 2);
-    std::uint8_t predicted[kMost + 2 * (kReach + 1)] = {};
+    bool predicted[kGroups][kMost + 2 * (kReach + 1)] = {};
     int lowest = kMost;
     int highest = -1;
     for (const Prediction& row : block.predictions)
         for (int i = 0; i < kBlock; ++i) {
             if (block.checks && row.against[i] != Invalid::kNone) continue;
             const int index = row.index[i];
-            predicted[index + kReach + 1] = 1;
+            predicted[i / kGroup][index + kReach + 1] = true;
             lowest = std::min(lowest, index);
             highest = std::max(highest, index);
         }
-    const auto near_predicted = [&](int k, int reach) {
+    const auto near_predicted = [&](int group, int k, int reach) {
+        const bool* const at = predicted[group] + k + kReach + 1;
         bool is = false;
         for (int i = -reach; i <= reach; ++i)
-            is = is || predicted[k + i + kReach + 1] != 0;
+            is = is || at[i];
         return is;
     };
     const int last = block.disparities - 1;
@@ -232,9 +242,16 @@ void FineBlockAny(const FineBlock& block) {
     const int behind = highest + kReach + 1;  // the last index needed
     for (int k = std::max(0, lowest - kReach - 1); k <= std::min(last + 1, behind); ++k) {
         std::uint8_t* const here = costs[k % 3];
-        if (k <= last && near_predicted(k, kReach + 1)) {
+        int begin = kBlock;  // the pixels that need it
+        int end = 0;
+        for (int group = 0; k <= last && group < kGroups; ++group) {
+            if (!near_predicted(group, k, kReach + 1)) continue;
+            begin = std::min(begin, group * kGroup);
+            end = (group + 1) * kGroup;
+        }
+        if (begin < end) {
             SumColumns<kWindow, false>(block.rows.data(), kFineRows, block.first_x, block.min_disparity + k,
-                                       differences, sums);
+                                       begin, end + 2 * kBlockMargin, differences, sums);
             RepeatEnds(kFineRows, block.first_x, block.width, kFineWindowReach, sums);
             const V disparity_low =
                 hn::Set(d, static_cast<std::uint8_t>(kDisparityOne * (block.min_disparity + k)));
@@ -242,7 +259,7 @@ void FineBlockAny(const FineBlock& block) {
                 const std::uint8_t* const sum = sums + r * kSpan + kBlockMargin;
                 const auto at = [&](int x) HWY_ATTR { return hn::LoadU(d, sum + x); };
                 const std::uint8_t* const low = block.predictions[static_cast<std::size_t>(r / 2)].low;
-                for (int i = 0; i < kBlock; i += kLanes) {
+                for (int i = begin; i < end; i += kLanes) {
                     const V outer = hn::AverageRound(hn::AverageRound(at(i - 3), at(i + 3)),
                                                      hn::AverageRound(at(i - 2), at(i + 2)));
                     const V inner = hn::AverageRound(hn::AverageRound(at(i - 1), at(i + 1)), at(i));
@@ -256,7 +273,14 @@ void FineBlockAny(const FineBlock& block) {
         }
         // The candidates of index k - 1, now that both its neighbours are known.
         const int candidate = k - 1;
-        if (candidate < 0 || candidate > last || !near_predicted(candidate, kReach)) continue;
+        begin = kBlock;
+        end = 0;
+        for (int group = 0; candidate >= 0 && group < kGroups; ++group) {
+            if (!near_predicted(group, candidate, kReach)) continue;
+            begin = std::min(begin, group * kGroup);
+            end = (group + 1) * kGroup;
+        }
+        if (begin >= end) continue;
         const std::uint8_t* const centre = costs[candidate % 3];
         const std::uint8_t* const below = costs[(candidate + 2) % 3];
         const V index = hn::Set(d, static_cast<std::uint8_t>(candidate));
@@ -266,7 +290,7 @@ void FineBlockAny(const FineBlock& block) {
             const CensusWinners& out = block.winners[static_cast<std::size_t>(r)];
             const std::uint8_t* const low = block.predictions[static_cast<std::size_t>(r / 2)].low;
             const std::uint8_t* const at = block.predictions[static_cast<std::size_t>(r / 2)].index;
-            for (int i = 0; i < kBlock; i += kLanes) {
+            for (int i = begin; i < end; i += kLanes) {
                 const hn::RebindToSigned<D> ds;
                 const V off =
                     hn::BitCast(d, hn::Abs(hn::BitCast(ds, hn::Sub(disparity_low, hn::LoadU(d, low + i)))));

@@ -23,7 +23,7 @@ struct CensusPair {
 };
 
 // Most rows of one call of thin_block().
-inline constexpr int kMostThinRows = 16;
+inline constexpr int kMostThinRows = 32;
 struct ThinBlock {
     const CensusPair* rows;  // count + kThinRows - 1 sampled rows, from kThinRows / 2 above the first
     int count;

@@ -22,7 +22,7 @@ using kernels::kFineRows;
 using kernels::kWidestVector;
 
 constexpr int kThinRowsBefore = kThinRows / 2;
-constexpr int kPartRows = 64;  // rows that one task finishes; a multiple of kFineRows and of kThinStep
+constexpr int kPartRows = 128;  // rows that one task finishes; a multiple of kFineRows and of kThinStep
 constexpr int kPartThinRows = kPartRows / kThinStep;
 static_assert(kPartRows % kFineRows == 0 && kPartThinRows <= kernels::kMostThinRows);
 // Rows of census words that a task holds: all it looks at in the thin search, or a strip and its windows.
