@@ -440,10 +440,15 @@ HWY_INLINE void AnswerRowOf(const CensusAnswer& how, const CensusWinners& winner
     const auto load = [&](const std::uint8_t* row, int x)
                           HWY_ATTR { return hn::PromoteTo(d, hn::LoadU(d8, row + x)); };
     const int last = how.disparities - 1;
-    if (kChecks && how.left_right_px >= 0)
-        for (int x = 0; x < how.width; ++x)
-            how.at_right[x] =
-                static_cast<std::uint8_t>(255 - (winners.at_right[x - winners.index[x] + last] & 255));
+    if (kChecks && how.left_right_px >= 0) {
+        // Local: stores of bytes could change `how` and `winners`.
+        const std::uint8_t* const index = winners.index;
+        const std::uint16_t* const voted = winners.at_right + last;
+        std::uint8_t* const at_right = how.at_right;
+        const int count = how.width;
+        for (int x = 0; x < count; ++x)
+            at_right[x] = static_cast<std::uint8_t>(255 - (voted[x - index[x]] & 255));
+    }
     const V16s last_index = hn::Set(d, static_cast<std::int16_t>(last));
     const V16s first_disparity = hn::Set(d, static_cast<std::int16_t>(how.min_disparity));
     const V16s width = hn::Set(d, static_cast<std::int16_t>(how.width));

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstring>
 
 #undef HWY_TARGET_INCLUDE
@@ -198,34 +199,104 @@ void VoteRowAny(int width, int disparities, const std::uint8_t* against, const C
     }
 }
 
+// A set of disparity indices.
+class IndexSet {
+  public:
+    void add(int index) {
+        words_[static_cast<std::size_t>(index) / 64] |= std::uint64_t{1}
+                                                        << (static_cast<unsigned>(index) % 64);
+    }
+    bool has(int index) const {
+        if (index < 0 || index > 255) return false;
+        return (words_[static_cast<std::size_t>(index) / 64] >> (static_cast<unsigned>(index) % 64) & 1U) !=
+               0;
+    }
+    // With every index that is one away from a member.
+    IndexSet widened() const {
+        IndexSet wide = *this;
+        for (std::size_t i = 0; i < words_.size(); ++i) {
+            wide.words_[i] |= words_[i] << 1U | words_[i] >> 1U;
+            if (i > 0) wide.words_[i] |= words_[i - 1] >> 63U;
+            if (i + 1 < words_.size()) wide.words_[i] |= words_[i + 1] << 63U;
+        }
+        return wide;
+    }
+    void merge(const IndexSet& other) {
+        for (std::size_t i = 0; i < words_.size(); ++i)
+            words_[i] |= other.words_[i];
+    }
+    // The smallest member, 256 if there is none; the largest, -1 if there is none.
+    int first() const {
+        for (std::size_t i = 0; i < words_.size(); ++i)
+            if (words_[i] != 0) return static_cast<int>(64 * i) + std::countr_zero(words_[i]);
+        return 256;
+    }
+    int last() const {
+        for (std::size_t i = words_.size(); i-- > 0;)
+            if (words_[i] != 0) return static_cast<int>(64 * i) + 63 - std::countl_zero(words_[i]);
+        return -1;
+    }
+
+  private:
+    std::array<std::uint64_t, 4> words_{};
+};
+
+// The indices predicted for `count` pixels, a multiple of 8; `judged`: by those that nothing speaks against.
+IndexSet PredictedIndices(const Prediction& row, int first, int count, bool judged) {
+    IndexSet set;
+    constexpr std::uint64_t kEach = 0x0101010101010101U;
+    int previous = -1;
+    for (int x = first; x < first + count; x += 8) {
+        std::uint64_t indices = 0;
+        std::uint64_t against = 0;
+        std::memcpy(&indices, row.index + x, 8);
+        if (judged) std::memcpy(&against, row.against + x, 8);
+        // Mostly all eight predict what those before did.
+        if (against == 0 && previous >= 0 && indices == kEach * static_cast<std::uint64_t>(previous))
+            continue;
+        for (int i = x; i < x + 8; ++i) {
+            if (judged && row.against[i] != Invalid::kNone) continue;
+            if (row.index[i] == previous) continue;
+            previous = row.index[i];
+            set.add(previous);
+        }
+    }
+    return set;
+}
+
 void FineBlockAny(const FineBlock& block) {
     const D d;
     constexpr int kGroup = 32;  // pixels that are skipped together
     constexpr int kGroups = kBlock / kGroup;
     static_assert(kGroup % kLanes == 0 && 2 * kBlockMargin % kLanes == 0);
     constexpr int kWindow = 2 * kFineWindowReach + 1;
-    constexpr int kMost = 256;
-    // Which indices are predicted somewhere in the block. A candidate is at most 1 away from one; its
-    // neighbours, at most 2 away, are needed for the sub-pixel fit.
-    constexpr int kReach = 1;
-    static_assert(kFineReachQ4 < kDisparityOne * (kReach + 1) - kDisparityOne / 2);
-    bool predicted[kGroups][kMost + 2 * (kReach + 1)] = {};
-    int lowest = kMost;
-    int highest = -1;
-    for (const Prediction& row : block.predictions)
-        for (int i = 0; i < kBlock; ++i) {
-            if (block.checks && row.against[i] != Invalid::kNone) continue;
-            const int index = row.index[i];
-            predicted[i / kGroup][index + kReach + 1] = true;
-            lowest = std::min(lowest, index);
-            highest = std::max(highest, index);
+    // A candidate is within 1 px of an index predicted in its group; its neighbours, within 2 px, are needed
+    // for the sub-pixel fit.
+    static_assert(kFineReachQ4 < kDisparityOne + kDisparityOne / 2);
+    std::array<IndexSet, kGroups> candidates;
+    std::array<IndexSet, kGroups> needed;
+    IndexSet all;
+    for (int group = 0; group < kGroups; ++group) {
+        IndexSet predicted;
+        for (const Prediction& row : block.predictions)
+            predicted.merge(PredictedIndices(row, group * kGroup, kGroup, block.checks));
+        candidates[static_cast<std::size_t>(group)] = predicted.widened();
+        needed[static_cast<std::size_t>(group)] = predicted.widened().widened();
+        all.merge(needed[static_cast<std::size_t>(group)]);
+    }
+    // The pixels of all groups that have index k in their set, as one range.
+    struct Range {
+        int begin;
+        int end;
+    };
+    const auto range_of = [](const std::array<IndexSet, kGroups>& sets, int k) {
+        Range range{kBlock, 0};
+        for (int group = 0; group < kGroups; ++group) {
+            if (!sets[static_cast<std::size_t>(group)].has(k)) continue;
+            range.begin = std::min(range.begin, group * kGroup);
+            range.end = (group + 1) * kGroup;
         }
-    const auto near_predicted = [&](int group, int k, int reach) {
-        const bool* const at = predicted[group] + k + kReach + 1;
-        bool is = false;
-        for (int i = -reach; i <= reach; ++i)
-            is = is || at[i];
-        return is;
+        return range;
     };
     const int last = block.disparities - 1;
 
@@ -238,20 +309,13 @@ void FineBlockAny(const FineBlock& block) {
         std::memset(row.index, 0, kBlock);
     }
     const V reach = hn::Set(d, kFineReachQ4);
-    const V near = hn::Set(d, kReach);
-    const int behind = highest + kReach + 1;  // the last index needed
-    for (int k = std::max(0, lowest - kReach - 1); k <= std::min(last + 1, behind); ++k) {
+    const V near = hn::Set(d, 1);
+    for (int k = all.first(); k <= std::min(last + 1, all.last()); ++k) {
         std::uint8_t* const here = costs[k % 3];
-        int begin = kBlock;  // the pixels that need it
-        int end = 0;
-        for (int group = 0; k <= last && group < kGroups; ++group) {
-            if (!near_predicted(group, k, kReach + 1)) continue;
-            begin = std::min(begin, group * kGroup);
-            end = (group + 1) * kGroup;
-        }
-        if (begin < end) {
+        const Range wanted = range_of(needed, k);
+        if (k <= last && wanted.begin < wanted.end) {
             SumColumns<kWindow, false>(block.rows.data(), kFineRows, block.first_x, block.min_disparity + k,
-                                       begin, end + 2 * kBlockMargin, differences, sums);
+                                       wanted.begin, wanted.end + 2 * kBlockMargin, differences, sums);
             RepeatEnds(kFineRows, block.first_x, block.width, kFineWindowReach, sums);
             const V disparity_low =
                 hn::Set(d, static_cast<std::uint8_t>(kDisparityOne * (block.min_disparity + k)));
@@ -259,7 +323,7 @@ void FineBlockAny(const FineBlock& block) {
                 const std::uint8_t* const sum = sums + r * kSpan + kBlockMargin;
                 const auto at = [&](int x) HWY_ATTR { return hn::LoadU(d, sum + x); };
                 const std::uint8_t* const low = block.predictions[static_cast<std::size_t>(r / 2)].low;
-                for (int i = begin; i < end; i += kLanes) {
+                for (int i = wanted.begin; i < wanted.end; i += kLanes) {
                     const V outer = hn::AverageRound(hn::AverageRound(at(i - 3), at(i + 3)),
                                                      hn::AverageRound(at(i - 2), at(i + 2)));
                     const V inner = hn::AverageRound(hn::AverageRound(at(i - 1), at(i + 1)), at(i));
@@ -273,24 +337,18 @@ void FineBlockAny(const FineBlock& block) {
         }
         // The candidates of index k - 1, now that both its neighbours are known.
         const int candidate = k - 1;
-        begin = kBlock;
-        end = 0;
-        for (int group = 0; candidate >= 0 && group < kGroups; ++group) {
-            if (!near_predicted(group, candidate, kReach)) continue;
-            begin = std::min(begin, group * kGroup);
-            end = (group + 1) * kGroup;
-        }
-        if (begin >= end) continue;
+        const Range judged = range_of(candidates, candidate);
+        if (judged.begin >= judged.end) continue;
         const std::uint8_t* const centre = costs[candidate % 3];
         const std::uint8_t* const below = costs[(candidate + 2) % 3];
         const V index = hn::Set(d, static_cast<std::uint8_t>(candidate));
         const V disparity_low =
             hn::Set(d, static_cast<std::uint8_t>(kDisparityOne * (block.min_disparity + candidate)));
         for (int r = 0; r < kFineRows; ++r) {
-            const CensusWinners& out = block.winners[static_cast<std::size_t>(r)];
+            const CensusWinners out = block.winners[static_cast<std::size_t>(r)];
             const std::uint8_t* const low = block.predictions[static_cast<std::size_t>(r / 2)].low;
             const std::uint8_t* const at = block.predictions[static_cast<std::size_t>(r / 2)].index;
-            for (int i = begin; i < end; i += kLanes) {
+            for (int i = judged.begin; i < judged.end; i += kLanes) {
                 const hn::RebindToSigned<D> ds;
                 const V off =
                     hn::BitCast(d, hn::Abs(hn::BitCast(ds, hn::Sub(disparity_low, hn::LoadU(d, low + i)))));
