@@ -14,22 +14,24 @@ struct SamplePair {
     int dx;
     int dy;
 };
+// The first eight stay within 2 px to the side: what a thing 5 px wide contains.
 inline constexpr std::array<SamplePair, 16> kCensusPairs = {{{1, 0},
                                                              {2, 0},
-                                                             {4, 0},
-                                                             {-3, 1},
                                                              {-1, 1},
                                                              {0, 1},
                                                              {1, 1},
-                                                             {3, 1},
-                                                             {-4, 2},
                                                              {-2, 2},
                                                              {0, 2},
                                                              {2, 2},
+                                                             {4, 0},
+                                                             {-3, 1},
+                                                             {3, 1},
+                                                             {-4, 2},
                                                              {4, 2},
                                                              {-2, 3},
                                                              {0, 3},
                                                              {2, 3}}};
+inline constexpr unsigned kNarrowPairs = 0xFF;  // bits of the census word
 inline constexpr int kCensusReachX = 4;
 inline constexpr int kCensusReachY = 3;
 

@@ -12,8 +12,8 @@ namespace groundline::stereo {
 //
 // Thin: what is 5 px wide near the camera is 2.5 px wide there and drowns in its surroundings. So every pixel
 // of every kThinStep-th row looks for a disparity at least kThinNearer px nearer than predicted, by a window
-// of 3 px times kThinRows such rows (poles and trunks stand upright) and by the pairs of the census that a
-// narrow thing contains. Where the best of them is better than half of what the prediction reaches, and good
+// of 3 px times kThinRows such rows (poles and trunks stand upright) and by the kNarrowPairs of
+// the census. Where the best of them is better than half of what the prediction reaches, and good
 // in itself, it becomes the prediction.
 //
 // Fine: around each prediction, within kFineReachQ4, the lowest cost of a 7x7 window of full-resolution
@@ -22,18 +22,9 @@ inline constexpr int kThinStep = 4;
 inline constexpr int kThinRows = 8;
 inline constexpr int kThinNearer = 4;
 inline constexpr int kThinPredictedWithin = 2;  // px around the prediction that count as predicted
-inline constexpr int kThinHighest = 79;         // of 255: 30 percent of the bits differ
+inline constexpr int kThinHighest = 57;         // of 192 bits: 30 percent differ
 inline constexpr int kFineReachQ4 = 16;
 inline constexpr int kFineWindowReach = 3;
-
-// Bits of the census word whose pairs reach at most 2 px to the side.
-constexpr std::uint16_t narrow_pairs() {
-    unsigned bits = 0;
-    for (std::size_t i = 0; i < kCensusPairs.size(); ++i)
-        if (kCensusPairs[i].dx >= -2 && kCensusPairs[i].dx <= 2) bits |= 1U << i;
-    return static_cast<std::uint16_t>(bits);
-}
-inline constexpr std::uint16_t kNarrowPairs = narrow_pairs();
 
 // The search range of the coarse level: covers min_disparity .. min_disparity + disparities - 1, halved.
 struct CoarseRange {

@@ -87,7 +87,7 @@ class Pyramid {
         for (int j = -kThinRows / 2; j < kThinRows / 2; ++j)
             for (int i = -1; i <= 1; ++i)
                 sum += difference(x + i, kThinStep * std::clamp(row + j, 0, rows - 1), k, kNarrowPairs);
-        return std::min(sum, 255);
+        return sum;
     }
 
     void replace_by_thin() {

@@ -28,16 +28,15 @@ HWY_INLINE auto AtMost(V a, V b) {
     return hn::Eq(hn::Min(a, b), a);
 }
 
-// Differing bits of the words at columns x .. of one row, the right ones `shift` columns further left.
+// Differing bits of the words at columns x .. of one row, the right ones `shift` columns further left; of the
+// kNarrowPairs alone, or of all.
 template <bool kNarrow>
 HWY_INLINE V Differences(const CensusPair& row, int x, std::ptrdiff_t shift) {
+    static_assert(kNarrowPairs == 0xFF, "the low bytes");
     const D d;
-    V low = hn::Xor(hn::LoadU(d, row.left.low + x), hn::LoadU(d, row.right.low + x - shift));
-    V high = hn::Xor(hn::LoadU(d, row.left.high + x), hn::LoadU(d, row.right.high + x - shift));
-    if (kNarrow) {
-        low = hn::And(low, hn::Set(d, kNarrowPairs & 255U));
-        high = hn::And(high, hn::Set(d, kNarrowPairs >> 8U));
-    }
+    const V low = hn::Xor(hn::LoadU(d, row.left.low + x), hn::LoadU(d, row.right.low + x - shift));
+    if (kNarrow) return hn::PopulationCount(low);
+    const V high = hn::Xor(hn::LoadU(d, row.left.high + x), hn::LoadU(d, row.right.high + x - shift));
     return hn::Add(hn::PopulationCount(low), hn::PopulationCount(high));
 }
 
