@@ -46,20 +46,26 @@ template <int kRows, bool kNarrow>
 HWY_INLINE void SumColumns(const CensusPair* rows, int count, int first_x, std::ptrdiff_t shift, int begin,
                            int end, std::uint8_t* differences, std::uint8_t* sums) {
     const D d;
-    for (int i = begin; i < end; i += kLanes) {
-        const int x = first_x - kBlockMargin + i;
-        V sum = hn::Zero(d);
-        for (int r = 0; r < kRows - 1; ++r) {
-            const V here = Differences<kNarrow>(rows[r], x, shift);
+    constexpr int kVectors = kSpan / kLanes;
+    V sum[kVectors];
+    HWY_UNROLL(8)
+    for (V& each : sum)
+        each = hn::Zero(d);
+    const int first = begin / kLanes;
+    const int last = end / kLanes;
+    for (int r = 0; r < count + kRows - 1; ++r) {
+        const CensusPair row = rows[r];
+        HWY_UNROLL(8)
+        for (int v = 0; v < kVectors; ++v) {
+            if (v < first || v >= last) continue;
+            const int i = v * kLanes;
+            const V here = Differences<kNarrow>(row, first_x - kBlockMargin + i, shift);
             hn::Store(here, d, differences + r * kSpan + i);
-            sum = hn::Add(sum, here);
-        }
-        for (int r = 0; r < count; ++r) {
-            const V here = Differences<kNarrow>(rows[r + kRows - 1], x, shift);
-            hn::Store(here, d, differences + (r + kRows - 1) * kSpan + i);
-            sum = hn::Add(sum, here);
-            hn::Store(sum, d, sums + r * kSpan + i);
-            sum = hn::Sub(sum, hn::Load(d, differences + r * kSpan + i));
+            sum[v] = hn::Add(sum[v], here);
+            if (r < kRows - 1) continue;
+            const int top = r - (kRows - 1);
+            hn::Store(sum[v], d, sums + top * kSpan + i);
+            sum[v] = hn::Sub(sum[v], hn::Load(d, differences + top * kSpan + i));
         }
     }
 }
@@ -198,6 +204,13 @@ void VoteRowAny(int width, int disparities, const std::uint8_t* against, const C
     }
 }
 
+// Distance from the prediction in 1/16 px, from the low bytes of both; right where it is below 8 px.
+HWY_INLINE V OffPrediction(V disparity_low, V predicted_low) {
+    const D d;
+    const hn::RebindToSigned<D> ds;
+    return hn::BitCast(d, hn::Abs(hn::BitCast(ds, hn::Sub(disparity_low, predicted_low))));
+}
+
 // A set of disparity indices.
 class IndexSet {
   public:
@@ -318,19 +331,18 @@ void FineBlockAny(const FineBlock& block) {
             RepeatEnds(kFineRows, block.first_x, block.width, kFineWindowReach, sums);
             const V disparity_low =
                 hn::Set(d, static_cast<std::uint8_t>(kDisparityOne * (block.min_disparity + k)));
-            for (int r = 0; r < kFineRows; ++r) {
-                const std::uint8_t* const sum = sums + r * kSpan + kBlockMargin;
-                const auto at = [&](int x) HWY_ATTR { return hn::LoadU(d, sum + x); };
-                const std::uint8_t* const low = block.predictions[static_cast<std::size_t>(r / 2)].low;
+            for (int pair = 0; pair < kFineRows / 2; ++pair) {
+                const std::uint8_t* const low = block.predictions[static_cast<std::size_t>(pair)].low;
                 for (int i = wanted.begin; i < wanted.end; i += kLanes) {
-                    const V outer = hn::AverageRound(hn::AverageRound(at(i - 3), at(i + 3)),
-                                                     hn::AverageRound(at(i - 2), at(i + 2)));
-                    const V inner = hn::AverageRound(hn::AverageRound(at(i - 1), at(i + 1)), at(i));
-                    // Right modulo 256 where it matters: up to 2 px from the prediction.
-                    const hn::RebindToSigned<D> ds;
-                    const V off = hn::BitCast(
-                        d, hn::Abs(hn::BitCast(ds, hn::Sub(disparity_low, hn::LoadU(d, low + i)))));
-                    hn::Store(hn::SaturatedAdd(hn::Add(outer, inner), off), d, here + r * kBlock + i);
+                    const V off = OffPrediction(disparity_low, hn::LoadU(d, low + i));
+                    for (int r = 2 * pair; r < 2 * pair + 2; ++r) {
+                        const std::uint8_t* const sum = sums + r * kSpan + kBlockMargin + i;
+                        const auto at = [&](int x) HWY_ATTR { return hn::LoadU(d, sum + x); };
+                        const V outer = hn::AverageRound(hn::AverageRound(at(-3), at(3)),
+                                                         hn::AverageRound(at(-2), at(2)));
+                        const V inner = hn::AverageRound(hn::AverageRound(at(-1), at(1)), at(0));
+                        hn::Store(hn::SaturatedAdd(hn::Add(outer, inner), off), d, here + r * kBlock + i);
+                    }
                 }
             }
         }
@@ -343,25 +355,28 @@ void FineBlockAny(const FineBlock& block) {
         const V index = hn::Set(d, static_cast<std::uint8_t>(candidate));
         const V disparity_low =
             hn::Set(d, static_cast<std::uint8_t>(kDisparityOne * (block.min_disparity + candidate)));
-        for (int r = 0; r < kFineRows; ++r) {
-            const CensusWinners out = block.winners[static_cast<std::size_t>(r)];
-            const std::uint8_t* const low = block.predictions[static_cast<std::size_t>(r / 2)].low;
-            const std::uint8_t* const at = block.predictions[static_cast<std::size_t>(r / 2)].index;
+        for (int pair = 0; pair < kFineRows / 2; ++pair) {
+            const Prediction predicted = block.predictions[static_cast<std::size_t>(pair)];
+            const CensusWinners outs[2] = {block.winners[static_cast<std::size_t>(2 * pair)],
+                                           block.winners[static_cast<std::size_t>(2 * pair + 1)]};
             for (int i = judged.begin; i < judged.end; i += kLanes) {
-                const hn::RebindToSigned<D> ds;
-                const V off =
-                    hn::BitCast(d, hn::Abs(hn::BitCast(ds, hn::Sub(disparity_low, hn::LoadU(d, low + i)))));
-                const auto is_near = AtMost(Distance(index, hn::LoadU(d, at + i)), near);
-                const V cost = hn::Load(d, centre + r * kBlock + i);
-                const V best = hn::LoadU(d, out.best + i);
-                const auto wins = hn::And(hn::And(is_near, AtMost(off, reach)), hn::Lt(cost, best));
-                const auto put = [&](std::uint8_t* row, V value) HWY_ATTR {
-                    hn::StoreU(hn::IfThenElse(wins, value, hn::LoadU(d, row + i)), d, row + i);
-                };
-                hn::StoreU(hn::IfThenElse(wins, cost, best), d, out.best + i);
-                put(out.index, index);
-                put(out.lower, hn::Load(d, below + r * kBlock + i));
-                put(out.upper, hn::Load(d, here + r * kBlock + i));
+                const V off = OffPrediction(disparity_low, hn::LoadU(d, predicted.low + i));
+                const V apart = Distance(index, hn::LoadU(d, predicted.index + i));
+                const auto is_near = hn::And(AtMost(apart, near), AtMost(off, reach));
+                for (int j = 0; j < 2; ++j) {
+                    const CensusWinners& out = outs[j];
+                    const int at = (2 * pair + j) * kBlock + i;
+                    const V cost = hn::Load(d, centre + at);
+                    const V best = hn::LoadU(d, out.best + i);
+                    const auto wins = hn::And(is_near, hn::Lt(cost, best));
+                    const auto put = [&](std::uint8_t* row, V value) HWY_ATTR {
+                        hn::StoreU(hn::IfThenElse(wins, value, hn::LoadU(d, row + i)), d, row + i);
+                    };
+                    hn::StoreU(hn::IfThenElse(wins, cost, best), d, out.best + i);
+                    put(out.index, index);
+                    put(out.lower, hn::Load(d, below + at));
+                    put(out.upper, hn::Load(d, here + at));
+                }
             }
         }
     }
