@@ -253,34 +253,43 @@ class IndexSet {
     std::array<std::uint64_t, 4> words_{};
 };
 
-// The indices predicted for `count` pixels, a multiple of 8; `judged`: by those that nothing speaks against.
-IndexSet PredictedIndices(const Prediction& row, int first, int count, bool judged) {
-    IndexSet set;
-    constexpr std::uint64_t kEach = 0x0101010101010101U;
-    int previous = -1;
-    for (int x = first; x < first + count; x += 8) {
-        std::uint64_t indices = 0;
-        std::uint64_t against = 0;
-        std::memcpy(&indices, row.index + x, 8);
-        if (judged) std::memcpy(&against, row.against + x, 8);
-        // Mostly all eight predict what those before did.
-        if (against == 0 && previous >= 0 && indices == kEach * static_cast<std::uint64_t>(previous))
-            continue;
-        for (int i = x; i < x + 8; ++i) {
-            if (judged && row.against[i] != Invalid::kNone) continue;
-            if (row.index[i] == previous) continue;
-            previous = row.index[i];
-            set.add(previous);
+// The indices predicted for kGroup pixels of some rows; `judged`: by those that nothing speaks against.
+constexpr int kGroup = 32;
+static_assert(kGroup % kLanes == 0 && kBlock % kGroup == 0 && 2 * kBlockMargin % kLanes == 0);
+template <std::size_t kRows>
+IndexSet PredictedIndices(const std::array<Prediction, kRows>& rows, int first, bool judged) {
+    const D d;
+    V least = hn::Set(d, 255);
+    V most = hn::Zero(d);
+    for (const Prediction& row : rows)
+        for (int x = first; x < first + kGroup; x += kLanes) {
+            const V index = hn::LoadU(d, row.index + x);
+            const V against = hn::LoadU(d, reinterpret_cast<const std::uint8_t*>(row.against) + x);
+            const V out = hn::VecFromMask(d, hn::Ne(against, hn::Set(d, judged ? 0 : 255)));
+            const V kept = judged ? hn::Not(out) : out;  // reasons never are 255
+            least = hn::Min(least, hn::Or(index, hn::Not(kept)));
+            most = hn::Max(most, hn::And(index, kept));
         }
+    alignas(64) std::uint8_t lanes[2][kLanes];
+    hn::Store(least, d, lanes[0]);
+    hn::Store(most, d, lanes[1]);
+    const int lowest = *std::min_element(lanes[0], lanes[0] + kLanes);
+    const int highest = *std::max_element(lanes[1], lanes[1] + kLanes);
+    IndexSet set;
+    if (highest - lowest <= 2) {  // one surface, as mostly
+        for (int index = lowest; index <= highest; ++index)
+            set.add(index);
+        return set;
     }
+    for (const Prediction& row : rows)
+        for (int x = first; x < first + kGroup; ++x)
+            if (!judged || row.against[x] == Invalid::kNone) set.add(row.index[x]);
     return set;
 }
 
 void FineBlockAny(const FineBlock& block) {
     const D d;
-    constexpr int kGroup = 32;  // pixels that are skipped together
-    constexpr int kGroups = kBlock / kGroup;
-    static_assert(kGroup % kLanes == 0 && 2 * kBlockMargin % kLanes == 0);
+    constexpr int kGroups = kBlock / kGroup;  // what a whole group has no use for is skipped
     constexpr int kWindow = 2 * kFineWindowReach + 1;
     // A candidate is within 1 px of an index predicted in its group; its neighbours, within 2 px, are needed
     // for the sub-pixel fit.
@@ -289,9 +298,7 @@ void FineBlockAny(const FineBlock& block) {
     std::array<IndexSet, kGroups> needed;
     IndexSet all;
     for (int group = 0; group < kGroups; ++group) {
-        IndexSet predicted;
-        for (const Prediction& row : block.predictions)
-            predicted.merge(PredictedIndices(row, group * kGroup, kGroup, block.checks));
+        const IndexSet predicted = PredictedIndices(block.predictions, group * kGroup, block.checks);
         candidates[static_cast<std::size_t>(group)] = predicted.widened();
         needed[static_cast<std::size_t>(group)] = predicted.widened().widened();
         all.merge(needed[static_cast<std::size_t>(group)]);
