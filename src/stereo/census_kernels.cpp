@@ -111,7 +111,7 @@ HWY_INLINE void CensusRowOf(const std::uint8_t* const* rows, int width, const Ce
     };
     for (int x = 0; x < width; x += static_cast<int>(hn::Lanes(d))) {
         hn::StoreU(half(0, x), d, out.low + x);
-        hn::StoreU(half(8, x), d, out.high + x);
+        if (out.high != nullptr) hn::StoreU(half(8, x), d, out.high + x);
     }
 }
 

@@ -23,7 +23,7 @@ constexpr int cost_bytes(int disparities) {
     return (disparities + kCostVector - 1) / kCostVector * kCostVector;
 }
 
-// Census words of one row, low and high bytes apart.
+// Census words of one row, low and high bytes apart. Where high is null only the low bytes are wanted.
 struct CensusRow {
     std::uint8_t* low;
     std::uint8_t* high;

@@ -16,8 +16,10 @@ namespace groundline::stereo {
 // the census. Where the best of them is better than half of what the prediction reaches, and good
 // in itself, it becomes the prediction.
 //
-// Fine: around each prediction, within kFineReachQ4, the lowest cost of a 7x7 window of full-resolution
-// census words plus the distance from the prediction in 1/16 px.
+// Fine: around each prediction, within kFineReachQ4, the lowest cost of a 7x7 window of narrow pairs plus the
+// distance from the prediction in 1/16 px. All sixteen pairs would take off 0.4 points of bad-1 on KITTI and
+// nothing of bad-3, and take half as long again. With the checks on, pixels that the coarse level has a
+// reason against keep it: they are not refined and have no say in the left-right check.
 inline constexpr int kThinStep = 4;
 inline constexpr int kThinRows = 8;
 inline constexpr int kThinNearer = 4;

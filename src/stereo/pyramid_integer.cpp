@@ -49,12 +49,12 @@ class Pyramid {
                    static_cast<std::size_t>(left_.width) +
                static_cast<std::size_t>(std::clamp(x, 0, left_.width - 1));
     }
-    // Differing bits between left(x, y) and right(x - d, y), everything clamped to the image.
-    int difference(int x, int y, int k, unsigned pairs) const {
+    // Differing narrow pairs between left(x, y) and right(x - d, y), everything clamped to the image.
+    int difference(int x, int y, int k) const {
         x = std::clamp(x, 0, left_.width - 1);
         const unsigned a = left_words_[index(x, y)];
         const unsigned b = right_words_[index(x - config_.min_disparity - k, y)];
-        return bits_in((a ^ b) & pairs);
+        return bits_in((a ^ b) & kNarrowPairs);
     }
 
     void predict() {
@@ -86,7 +86,7 @@ class Pyramid {
         int sum = 0;
         for (int j = -kThinRows / 2; j < kThinRows / 2; ++j)
             for (int i = -1; i <= 1; ++i)
-                sum += difference(x + i, kThinStep * std::clamp(row + j, 0, rows - 1), k, kNarrowPairs);
+                sum += difference(x + i, kThinStep * std::clamp(row + j, 0, rows - 1), k);
         return sum;
     }
 
@@ -123,11 +123,11 @@ class Pyramid {
         const auto column = [&](int u) {
             int sum = 0;
             for (int j = -kFineWindowReach; j <= kFineWindowReach; ++j)
-                sum += difference(u, y + j, k, 0xFFFF);
+                sum += difference(u, y + j, k);
             return sum;
         };
-        return mean_up(mean_up(column(x - 3), column(x + 3)), mean_up(column(x - 2), column(x + 2))) +
-               mean_up(mean_up(column(x - 1), column(x + 1)), column(x));
+        return mean_up(column(x - 3) + column(x + 3), column(x - 2) + column(x + 2)) +
+               mean_up(column(x - 1) + column(x + 1), 2 * column(x));
     }
     int distance_q4(int x, int y, int k) const {
         return std::abs(kDisparityOne * (config_.min_disparity + k) - prediction_.q4[index(x, y)]);

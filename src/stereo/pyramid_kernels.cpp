@@ -28,21 +28,16 @@ HWY_INLINE auto AtMost(V a, V b) {
     return hn::Eq(hn::Min(a, b), a);
 }
 
-// Differing bits of the words at columns x .. of one row, the right ones `shift` columns further left; of the
-// kNarrowPairs alone, or of all.
-template <bool kNarrow>
+// Differing bits of the words at columns x .. of one row, the right ones `shift` columns further left.
 HWY_INLINE V Differences(const CensusPair& row, int x, std::ptrdiff_t shift) {
     static_assert(kNarrowPairs == 0xFF, "the low bytes");
     const D d;
-    const V low = hn::Xor(hn::LoadU(d, row.left.low + x), hn::LoadU(d, row.right.low + x - shift));
-    if (kNarrow) return hn::PopulationCount(low);
-    const V high = hn::Xor(hn::LoadU(d, row.left.high + x), hn::LoadU(d, row.right.high + x - shift));
-    return hn::Add(hn::PopulationCount(low), hn::PopulationCount(high));
+    return hn::PopulationCount(hn::Xor(hn::LoadU(d, row.left + x), hn::LoadU(d, row.right + x - shift)));
 }
 
 // Sums down `kRows` rows for `count` rows, over columns `begin` .. `end` - 1 of a block and its margins; row
 // r sums rows r .. r + kRows - 1.
-template <int kRows, bool kNarrow>
+template <int kRows>
 HWY_INLINE void SumColumns(const CensusPair* rows, int count, int first_x, std::ptrdiff_t shift, int begin,
                            int end, std::uint8_t* differences, std::uint8_t* sums) {
     const D d;
@@ -59,7 +54,7 @@ HWY_INLINE void SumColumns(const CensusPair* rows, int count, int first_x, std::
         for (int v = 0; v < kVectors; ++v) {
             if (v < first || v >= last) continue;
             const int i = v * kLanes;
-            const V here = Differences<kNarrow>(row, first_x - kBlockMargin + i, shift);
+            const V here = Differences(row, first_x - kBlockMargin + i, shift);
             hn::Store(here, d, differences + r * kSpan + i);
             sum[v] = hn::Add(sum[v], here);
             if (r < kRows - 1) continue;
@@ -92,44 +87,52 @@ void ThinBlockAny(const ThinBlock& block) {
     std::memset(predicted, 255, sizeof predicted);
     std::memset(nearer, 255, sizeof nearer);
     const int used = std::min(kBlock, block.width - block.first_x);
-    std::array<int, kMostThinRows> farthest_of;  // of each row
+    // Predicted in each row.
+    std::array<int, kMostThinRows> farthest_of;
+    std::array<int, kMostThinRows> nearest_of;
     int farthest = 255;
     for (int r = 0; r < block.count; ++r) {
         const std::uint8_t* const row = block.predicted + r * block.predicted_stride;
-        int& lowest = farthest_of[static_cast<std::size_t>(r)];
-        lowest = *std::min_element(row, row + used);
-        farthest = std::min(farthest, lowest);
+        const auto at = static_cast<std::size_t>(r);
+        farthest_of[at] = *std::min_element(row, row + used);
+        nearest_of[at] = *std::max_element(row, row + used);
+        farthest = std::min(farthest, farthest_of[at]);
         std::memset(block.nearer + r * block.nearer_stride, 0, kBlock);
     }
     const V within = hn::Set(d, kThinPredictedWithin);
     const V apart = hn::Set(d, kThinNearer);
     for (int k = std::max(0, farthest - kThinPredictedWithin); k < block.disparities; ++k) {
-        SumColumns<kThinRows, true>(block.rows, block.count, block.first_x, block.min_disparity + k, 0, kSpan,
-                                    differences, sums);
+        SumColumns<kThinRows>(block.rows, block.count, block.first_x, block.min_disparity + k, 0, kSpan,
+                              differences, sums);
         RepeatEnds(block.count, block.first_x, block.width, 1, sums);
         const V index = hn::Set(d, static_cast<std::uint8_t>(k));
         for (int r = 0; r < block.count; ++r) {
-            if (k < farthest_of[static_cast<std::size_t>(r)] - kThinPredictedWithin) continue;
             const std::uint8_t* const row = sums + r * kSpan + kBlockMargin;
-            for (int i = 0; i < kBlock; i += kLanes) {
-                if (i >= used) break;
-                const V cost =
-                    hn::SaturatedAdd(hn::SaturatedAdd(hn::LoadU(d, row + i - 1), hn::LoadU(d, row + i)),
-                                     hn::LoadU(d, row + i + 1));
-                const V at = hn::LoadU(d, block.predicted + r * block.predicted_stride + i);
-                const auto is_predicted = AtMost(Distance(index, at), within);
-                std::uint8_t* const lowest = predicted + r * kBlock + i;
-                const V old = hn::Load(d, lowest);
-                hn::Store(hn::IfThenElse(is_predicted, hn::Min(old, cost), old), d, lowest);
-
-                std::uint8_t* const lowest_nearer = nearer + r * kBlock + i;
-                std::uint8_t* const which = block.nearer + r * block.nearer_stride + i;
-                const V best = hn::Load(d, lowest_nearer);
-                const auto is_nearer = AtMost(apart, hn::SaturatedSub(index, at));
-                const auto wins = hn::And(is_nearer, hn::Lt(cost, best));
-                hn::Store(hn::IfThenElse(wins, cost, best), d, lowest_nearer);
-                hn::StoreU(hn::IfThenElse(wins, index, hn::LoadU(d, which)), d, which);
-            }
+            const std::uint8_t* const at_row = block.predicted + r * block.predicted_stride;
+            const auto cost_at = [&](int i) HWY_ATTR {
+                return hn::Add(hn::Add(hn::LoadU(d, row + i - 1), hn::LoadU(d, row + i)),
+                               hn::LoadU(d, row + i + 1));
+            };
+            const int farthest_here = farthest_of[static_cast<std::size_t>(r)];
+            const int nearest_here = nearest_of[static_cast<std::size_t>(r)];
+            if (k >= farthest_here - kThinPredictedWithin && k <= nearest_here + kThinPredictedWithin)
+                for (int i = 0; i < used; i += kLanes) {
+                    const auto is_predicted = AtMost(Distance(index, hn::LoadU(d, at_row + i)), within);
+                    std::uint8_t* const lowest = predicted + r * kBlock + i;
+                    const V old = hn::Load(d, lowest);
+                    hn::Store(hn::IfThenElse(is_predicted, hn::Min(old, cost_at(i)), old), d, lowest);
+                }
+            if (k >= farthest_here + kThinNearer)
+                for (int i = 0; i < used; i += kLanes) {
+                    const V cost = cost_at(i);
+                    std::uint8_t* const lowest = nearer + r * kBlock + i;
+                    std::uint8_t* const which = block.nearer + r * block.nearer_stride + i;
+                    const V best = hn::Load(d, lowest);
+                    const auto is_nearer = AtMost(apart, hn::SaturatedSub(index, hn::LoadU(d, at_row + i)));
+                    const auto wins = hn::And(is_nearer, hn::Lt(cost, best));
+                    hn::Store(hn::IfThenElse(wins, cost, best), d, lowest);
+                    hn::StoreU(hn::IfThenElse(wins, index, hn::LoadU(d, which)), d, which);
+                }
         }
     }
     for (int r = 0; r < block.count; ++r) {
@@ -333,8 +336,8 @@ void FineBlockAny(const FineBlock& block) {
         std::uint8_t* const here = costs[k % 3];
         const Range wanted = range_of(needed, k);
         if (k <= last && wanted.begin < wanted.end) {
-            SumColumns<kWindow, false>(block.rows.data(), kFineRows, block.first_x, block.min_disparity + k,
-                                       wanted.begin, wanted.end + 2 * kBlockMargin, differences, sums);
+            SumColumns<kWindow>(block.rows.data(), kFineRows, block.first_x, block.min_disparity + k,
+                                wanted.begin, wanted.end + 2 * kBlockMargin, differences, sums);
             RepeatEnds(kFineRows, block.first_x, block.width, kFineWindowReach, sums);
             const V disparity_low =
                 hn::Set(d, static_cast<std::uint8_t>(kDisparityOne * (block.min_disparity + k)));
@@ -345,9 +348,9 @@ void FineBlockAny(const FineBlock& block) {
                     for (int r = 2 * pair; r < 2 * pair + 2; ++r) {
                         const std::uint8_t* const sum = sums + r * kSpan + kBlockMargin + i;
                         const auto at = [&](int x) HWY_ATTR { return hn::LoadU(d, sum + x); };
-                        const V outer = hn::AverageRound(hn::AverageRound(at(-3), at(3)),
-                                                         hn::AverageRound(at(-2), at(2)));
-                        const V inner = hn::AverageRound(hn::AverageRound(at(-1), at(1)), at(0));
+                        const V centre = at(0);
+                        const V outer = hn::AverageRound(hn::Add(at(-3), at(3)), hn::Add(at(-2), at(2)));
+                        const V inner = hn::AverageRound(hn::Add(at(-1), at(1)), hn::Add(centre, centre));
                         hn::Store(hn::SaturatedAdd(hn::Add(outer, inner), off), d, here + r * kBlock + i);
                     }
                 }

@@ -15,11 +15,11 @@ namespace groundline::stereo::kernels {
 inline constexpr int kBlock = 64;
 inline constexpr int kBlockMargin = 16;
 
-// Census words of one row of both views, each pointing to column 0. The right one is read at x -
+// The narrow pairs of one row of both views, each pointing to column 0. The right one is read at x -
 // min_disparity - k and must repeat its ends as far as that reaches.
 struct CensusPair {
-    CensusRow left;
-    CensusRow right;
+    std::uint8_t* left;
+    std::uint8_t* right;
 };
 
 // Most rows of one call of thin_block().

@@ -15,7 +15,6 @@ namespace groundline::stereo {
 namespace {
 
 using kernels::CensusPair;
-using kernels::CensusRow;
 using kernels::kBlock;
 using kernels::kBlockMargin;
 using kernels::kFineRows;
@@ -89,8 +88,7 @@ struct PyramidMatcher::Lane {
         };
         const auto rest = static_cast<std::size_t>(margin + blocks - width);
         for (CensusPair& row : held)
-            row = {{plane(margin, rest), plane(margin, rest)},
-                   {plane(before, behind), plane(before, behind)}};
+            row = {plane(margin, rest), plane(before, behind)};
         low = arena.image<std::uint8_t>(blocks, kPartThinRows);
         index = arena.image<std::uint8_t>(blocks, kPartThinRows);
         against = arena.image<Invalid>(blocks, kPartThinRows);
@@ -105,13 +103,11 @@ struct PyramidMatcher::Lane {
 
     kernels::Prediction prediction(int row) const { return {low.row(row), index.row(row), against.row(row)}; }
     void take_census(ConstLuma left, ConstLuma right, int y, const CensusPair& row) {
-        left_rows.take(left, y, row.left);
-        right_rows.take(right, y, row.right);
+        left_rows.take(left, y, {row.left, nullptr});
+        right_rows.take(right, y, {row.right, nullptr});
         const int width = left.width;
-        for (std::uint8_t* plane : {row.right.low, row.right.high}) {
-            std::memset(plane - before, plane[0], static_cast<std::size_t>(before));
-            std::memset(plane + width, plane[width - 1], behind);
-        }
+        std::memset(row.right - before, row.right[0], static_cast<std::size_t>(before));
+        std::memset(row.right + width, row.right[width - 1], behind);
     }
 };
 
