@@ -1,34 +1,12 @@
 // The paper's matcher on real pairs with truth, where they are at hand.
 #include <gtest/gtest.h>
 
-#include <filesystem>
-#include <opencv2/imgcodecs.hpp>
-#include <string>
-
 #include "stereo/paper_reference.hpp"
+#include "unit/stereo_real_pairs.hpp"
 #include "unit/stereo_test_tools.hpp"
 
 namespace groundline::stereo {
 namespace {
-
-struct RealPair {
-    cv::Mat left;
-    cv::Mat right;
-    cv::Mat truth;  // 1/256 px, 0 where unknown
-};
-
-ConstLuma view_of(const cv::Mat& image) {
-    return {image.data, image.cols, image.rows, static_cast<std::ptrdiff_t>(image.step)};
-}
-
-// Empty where the data is not there.
-RealPair load(const std::string& name) {
-    const std::string folder = std::string(GROUNDLINE_SOURCE_DIR "/../shared/data/") + name;
-    if (!std::filesystem::exists(folder + "/disp.png")) return {};
-    return {cv::imread(folder + "/left.png", cv::IMREAD_GRAYSCALE),
-            cv::imread(folder + "/right.png", cv::IMREAD_GRAYSCALE),
-            cv::imread(folder + "/disp.png", cv::IMREAD_UNCHANGED)};
-}
 
 // Hidden in the right view: another pixel of the row with a larger disparity falls on the same right pixel
 // (within half a pixel), or the match lies outside.
@@ -86,7 +64,7 @@ TEST(RealPairs, KittiWithLocalMeanIsRarelyWrongWhereItAnswers) {
         const RealPair pair = load(name);
         if (pair.truth.empty())
             GTEST_SKIP() << "the KITTI pairs are not at hand (../shared/data/kitti2012_*)";
-        MatcherConfig config;
+        MatcherConfig config = paper();
         config.disparities = 128;
         config.normalise_local_mean = true;
         const OwnedResult result = match_fast(config, view_of(pair.left), view_of(pair.right));
