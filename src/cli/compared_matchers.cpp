@@ -28,6 +28,7 @@ constexpr std::array kOurs = {
     OurMethod{"paper", stereo::MatcherKind::kPaper, false},
     OurMethod{"paper_local_mean", stereo::MatcherKind::kPaper, true},
     OurMethod{"census", stereo::MatcherKind::kCensus, false},
+    OurMethod{"census_pyramid", stereo::MatcherKind::kCensusPyramid, false},
 };
 
 // OpenCV's, with what differs between them. Uniqueness in per cent.
@@ -96,7 +97,9 @@ cv::Mat mat(ConstLuma image) {
 
 class OpenCv final : public ComparedMatcher {
   public:
-    OpenCv(const OpenCvChoice& choice, const MatchSize& size) : min_disparity_(size.min_disparity) {
+    OpenCv(const OpenCvChoice& choice, const MatchSize& size)
+        : min_disparity_(size.min_disparity),
+          repeated_(size.repeat_left ? std::max(0, size.min_disparity + size.disparities) : 0) {
         if (choice.method == OpenCvMethod::kBlock) {
             const cv::Ptr<cv::StereoBM> block = cv::StereoBM::create(size.disparities, choice.window);
             block->setUniquenessRatio(choice.uniqueness);
@@ -112,7 +115,16 @@ class OpenCv final : public ComparedMatcher {
         matcher_->setDisp12MaxDiff(choice.left_right_px);
         matcher_->setSpeckleWindowSize(choice.speckle_px);
     }
-    void match(ConstLuma left, ConstLuma right) override { matcher_->compute(mat(left), mat(right), found_); }
+    void match(ConstLuma left, ConstLuma right) override {
+        if (repeated_ == 0) {
+            matcher_->compute(mat(left), mat(right), found_);
+            return;
+        }
+        cv::copyMakeBorder(mat(left), left_, 0, 0, repeated_, 0, cv::BORDER_REPLICATE);
+        cv::copyMakeBorder(mat(right), right_, 0, 0, repeated_, 0, cv::BORDER_REPLICATE);
+        matcher_->compute(left_, right_, wide_);
+        found_ = wide_.colRange(repeated_, wide_.cols);
+    }
     void answers(ImageView<std::uint16_t> disparity_q8) const override {
         assert(disparity_q8.same_size(found_.cols, found_.rows));
         static_assert(kDisparityOne == cv::StereoMatcher::DISP_SCALE);
@@ -126,7 +138,11 @@ class OpenCv final : public ComparedMatcher {
 
   private:
     int min_disparity_;
+    int repeated_;  // columns
     cv::Ptr<cv::StereoMatcher> matcher_;
+    cv::Mat left_;
+    cv::Mat right_;
+    cv::Mat wide_;
     cv::Mat found_;
 };
 
@@ -148,7 +164,7 @@ std::vector<MatcherChoice> all_matchers() {
         for (const bool checks : {false, true})
             all.push_back(
                 {fmt::format("{}/{}", method.name, checks ? "filtered" : "dense"),
-                 fmt::format("groundline's, local mean {}, checks {}", method.local_mean ? "removed" : "left",
+                 fmt::format("groundline's{}, checks {}", method.local_mean ? ", local mean removed" : "",
                              checks ? "as by default" : "off"),
                  true, [&method, checks](const MatchSize& size, Parallel& parallel) {
                      return std::make_unique<Ours>(method, checks, size, parallel);

@@ -18,6 +18,9 @@ struct MatchSize {
     int height = 0;
     int min_disparity = 0;
     int disparities = 0;  // multiple of 16
+    // Give OpenCV's matchers both views with their first column repeated to the left, as often as the range
+    // reaches: by themselves they answer nothing in so many columns.
+    bool repeat_left = false;
 };
 
 // A matcher for pictures of one size, with its memory.

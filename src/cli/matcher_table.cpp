@@ -115,7 +115,7 @@ class SetRun {
             hint = calibration.disparities_hint;
         }
         scores_.disparities = job.disparities > 0 ? job.disparities : rig::auto_disparities(info.width, hint);
-        const MatchSize size{info.width, info.height, 0, scores_.disparities};
+        const MatchSize size{info.width, info.height, 0, scores_.disparities, true};
         for (const MatcherChoice& choice : job.matchers)
             matchers_.push_back(choice.make(size, serial_));
         frame_ = StereoFrame::make(arena_, info.width, info.height, info.colour);
@@ -346,8 +346,8 @@ void print_table(const Job& job, const std::vector<MatcherGroup>& groups) {
     for (const Condition& condition : job.conditions)
         fmt::print("  {:<{}}  {}\n", condition.name, name_width, condition.what);
     fmt::print(
-        "Matchers, each from disparity 0 on. OpenCV {} answers nothing in the leftmost columns, as many as "
-        "disparities:\nthey count as absent.\n",
+        "Matchers, each from disparity 0 on. OpenCV {} gets the first column repeated to the left, as often "
+        "as there are\ndisparities: by itself it answers nothing in so many columns.\n",
         cv::getVersionString());
     for (const MatcherChoice& matcher : job.matchers)
         fmt::print("  {:<{}}  {}\n", matcher.name, name_width, matcher.parameters);

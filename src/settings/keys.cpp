@@ -137,6 +137,23 @@ Key disparities_key() {
     return key;
 }
 
+// A whole number that may be left to the matcher.
+template <typename Member>
+Key matchers_own(std::string name, int low, int high, std::string help, Member member) {
+    constexpr int kOwn = stereo::CheckLimits::kMatchersOwn;
+    Key key = whole(std::move(name), low, high, std::move(help), member);
+    key.range = "auto | " + key.range;
+    key.parse = [=, parse = key.parse](Settings& settings, std::string_view word) {
+        if (word != "auto") return parse(settings, word);
+        member(settings) = kOwn;
+        return true;
+    };
+    key.print = [=, print = key.print](const Settings& settings) {
+        return member(settings) == kOwn ? std::string("auto") : print(settings);
+    };
+    return key;
+}
+
 Key tolerance_key() {
     Key key = number(
         "terrain.tolerance_m", 0.01, 2.0, "Height and depth that the robot drives over.",
@@ -161,33 +178,45 @@ std::vector<Key> make_keys() {
     using terrain::Band;
     using terrain::LineMode;
     std::vector<Key> keys;
-    keys.push_back(choice<MatcherKind>("stereo.matcher", {{"paper", MatcherKind::kPaper}},
-                                       "How the pair is matched.", GROUNDLINE_MEMBER(matcher.kind)));
+    keys.push_back(choice<MatcherKind>("stereo.matcher",
+                                       {{"census_pyramid", MatcherKind::kCensusPyramid},
+                                        {"census", MatcherKind::kCensus},
+                                        {"paper", MatcherKind::kPaper}},
+                                       "How the pair is matched: census words and semi-global paths at half "
+                                       "the resolution, then refined; the same at full resolution; or the "
+                                       "paper's way.",
+                                       GROUNDLINE_MEMBER(matcher.kind)));
     keys.push_back(disparities_key());
     keys.push_back(whole("stereo.min_disparity", -128, 256, "Smallest disparity searched.",
                          GROUNDLINE_MEMBER(matcher.min_disparity)));
     keys.push_back(choice<bool>("stereo.normalise", {{"off", false}, {"local_mean", true}},
-                                "What is taken out of both views before matching; without it the paper's "
-                                "matcher fails where the cameras differ in brightness.",
+                                "Paper only: what is taken out of both views before matching; without it "
+                                "that matcher fails where the cameras differ in brightness.",
                                 GROUNDLINE_MEMBER(matcher.normalise_local_mean)));
-    keys.push_back(on_off(
-        "stereo.checks", "Sub-pixel and validity checks; off is the paper's pure form, every pixel answered.",
-        GROUNDLINE_MEMBER(matcher.checks)));
-    keys.push_back(on_off("stereo.subpixel", "With checks: refine to 1/16 px.",
+    keys.push_back(
+        on_off("stereo.checks",
+               "Validity checks; off, every pixel is answered (the paper's in whole pixels, its pure form).",
+               GROUNDLINE_MEMBER(matcher.checks)));
+    keys.push_back(on_off("stereo.subpixel", "Refine to 1/16 px; the paper's matcher with checks only.",
                           GROUNDLINE_MEMBER(matcher.limits.subpixel)));
     keys.push_back(
         whole("stereo.texture", 0, 100000,
               "With checks: least sum of horizontal grey-level steps in the 11x11 window; 0 is off.",
               GROUNDLINE_MEMBER(matcher.limits.texture)));
-    keys.push_back(whole("stereo.saturated_percent", 0, 100,
-                         "With checks: most percent of the window at black or white; 100 is off.",
-                         GROUNDLINE_MEMBER(matcher.limits.saturated_percent)));
-    keys.push_back(whole("stereo.cost_percent", 0, 100,
-                         "With checks: highest cost of an answer, percent of the truncation; 100 is off.",
-                         GROUNDLINE_MEMBER(matcher.limits.cost_percent)));
-    keys.push_back(whole("stereo.uniqueness_percent", -1, 100,
-                         "With checks: by how much the second-best match must be worse; -1 is off.",
-                         GROUNDLINE_MEMBER(matcher.limits.uniqueness_percent)));
+    keys.push_back(
+        matchers_own("stereo.saturated_percent", 0, 100,
+                     "With checks: most percent of the window at black or white; 100 is off; auto: 25 "
+                     "for the paper, else 75.",
+                     GROUNDLINE_MEMBER(matcher.limits.saturated_percent)));
+    keys.push_back(
+        whole("stereo.cost_percent", 0, 100,
+              "Paper only, with checks: highest cost of an answer, percent of the truncation; 100 is off.",
+              GROUNDLINE_MEMBER(matcher.limits.cost_percent)));
+    keys.push_back(
+        matchers_own("stereo.uniqueness_percent", -1, 100,
+                     "With checks: by how much the second-best match must be worse; -1 is off; auto: "
+                     "5 for the paper, else off.",
+                     GROUNDLINE_MEMBER(matcher.limits.uniqueness_percent)));
     keys.push_back(whole("stereo.left_right_px", -1, 16,
                          "With checks: most difference to the match from the right view; -1 is off.",
                          GROUNDLINE_MEMBER(matcher.limits.left_right_px)));

@@ -78,7 +78,8 @@ terrain::TerrainConfig terrain_config(const Settings& settings) {
     terrain::TerrainConfig config = settings.terrain;
     const MountSettings& mount = settings.mount;
     // Whole disparities carry 0.3 px from rounding alone, on top of what the match is off.
-    const bool subpixel = settings.matcher.checks && settings.matcher.limits.subpixel;
+    const bool can_refine = settings.matcher.checks || settings.matcher.kind != stereo::MatcherKind::kPaper;
+    const bool subpixel = can_refine && settings.matcher.limits.subpixel;
     if (!subpixel) config.sigma_disparity_px = 0.5;
     config.mount_x_m = mount.x_m;
     config.mount_y_m = mount.y_m;
@@ -97,8 +98,9 @@ terrain::TerrainConfig terrain_config(const Settings& settings) {
 
 verdict::Limits verdict_limits(const Settings& settings) {
     verdict::Limits limits;
-    limits.photometric =
-        settings.matcher.normalise_local_mean ? verdict::kLocalOrder : verdict::kRawDifferences;
+    const bool local =
+        settings.matcher.normalise_local_mean || settings.matcher.kind != stereo::MatcherKind::kPaper;
+    limits.photometric = local ? verdict::kLocalOrder : verdict::kRawDifferences;
     return limits;
 }
 

@@ -183,12 +183,12 @@ void match(const MatcherConfig& config, bool coarse, ConstLuma left, ConstLuma r
 
 void match_census_integer(const MatcherConfig& config, ConstLuma left, ConstLuma right,
                           const DisparityMap& out) {
-    match(config, false, left, right, out);
+    match(resolved(config), false, left, right, out);
 }
 
 void search_coarse_integer(const MatcherConfig& config, ConstLuma left, ConstLuma right,
                            const DisparityMap& out) {
-    MatcherConfig halved_config = config;
+    MatcherConfig halved_config = resolved(config);
     const CoarseRange range = coarse_range(config.min_disparity, config.disparities);
     halved_config.min_disparity = range.min_disparity;
     halved_config.disparities = range.disparities;

@@ -61,7 +61,7 @@ struct CensusMatcher::Lane {
 
 CensusMatcher::CensusMatcher(const MatcherConfig& config, int width, int height, int lanes, Arena& arena,
                              Use use)
-    : config_(config), coarse_(use == Use::kCoarse), width_(width), height_(height) {
+    : config_(resolved(config)), coarse_(use == Use::kCoarse), width_(width), height_(height) {
     if (coarse_) {
         config_.limits.speckle_px = 0;
         config_.limits.median = false;
@@ -69,7 +69,7 @@ CensusMatcher::CensusMatcher(const MatcherConfig& config, int width, int height,
     const std::size_t before = arena.bytes();
     lanes_.reserve(static_cast<std::size_t>(lanes));
     for (int lane = 0; lane < std::min(lanes, band_count(height)); ++lane)
-        lanes_.emplace_back(config, width, arena);
+        lanes_.emplace_back(config_, width, arena);
     if (config_.checks && config_.limits.speckle_px > 0) speckles_ = SpeckleScratch(width, arena);
     if (config_.checks && config_.limits.median)
         median_rows_ = arena.take<std::int16_t>(2 * static_cast<std::size_t>(width));

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "core/error.hpp"
+#include "stereo/census_kernels.hpp"
 #include "stereo/census_matcher.hpp"
 #include "stereo/paper_matcher.hpp"
 #include "stereo/pyramid_matcher.hpp"
@@ -33,6 +34,16 @@ void check(const MatcherConfig& config, int width, int height) {
     if (last > 2046 || first < -2046)
         refuse("disparities " + std::to_string(first) + " to " + std::to_string(last) +
                " px do not fit the result: they must stay within -2046 to 2046");
+    if (config.kind != MatcherKind::kPaper) {
+        if (config.normalise_local_mean)
+            refuse(
+                "the local mean is taken out for the paper's matcher alone: census words do not depend on "
+                "brightness, so switch the normalisation off or choose the paper's matcher");
+        if (width > kernels::kMostCensusWidth)
+            refuse("images of " + size + " px are too wide for the census matchers: at most " +
+                   std::to_string(kernels::kMostCensusWidth) + " px");
+        return;
+    }
     const int highest = config.paper.rule_one == RuleOne::kSum9 ? 14 : 28;
     if (config.paper.truncation < 1 || config.paper.truncation > highest)
         refuse("the truncation of the paper's cost is " + std::to_string(config.paper.truncation) +
@@ -40,6 +51,15 @@ void check(const MatcherConfig& config, int width, int height) {
 }
 
 }  // namespace
+
+MatcherConfig resolved(const MatcherConfig& config) {
+    MatcherConfig result = config;
+    const bool paper = config.kind == MatcherKind::kPaper;
+    CheckLimits& limits = result.limits;
+    if (limits.saturated_percent == CheckLimits::kMatchersOwn) limits.saturated_percent = paper ? 25 : 75;
+    if (limits.uniqueness_percent == CheckLimits::kMatchersOwn) limits.uniqueness_percent = paper ? 5 : -1;
+    return result;
+}
 
 std::unique_ptr<Matcher> make_matcher(const MatcherConfig& config, int width, int height, int lanes,
                                       Arena& arena) {

@@ -40,18 +40,21 @@ enum class MatcherKind : std::uint8_t {
 };
 
 struct MatcherConfig {
-    MatcherKind kind = MatcherKind::kPaper;
+    MatcherKind kind = MatcherKind::kCensusPyramid;
     // Smallest disparity searched, px; may be negative. Results are absolute: left(x) matches right(x - d).
     int min_disparity = 0;
     int disparities = 64;  // multiple of 16, 16 .. 256
-    // Take the 15x15 mean out of both views first: without it a brightness difference of some ten grey
-    // levels between the cameras ruins the paper's cost.
+    // Paper only: take the 15x15 mean out of both views first. Without it a brightness difference of some ten
+    // grey levels between the cameras ruins its cost.
     bool normalise_local_mean = false;
-    // Sub-pixel and validity tests. Off is the paper's pure form: every pixel answered, in whole pixels.
+    // Validity tests. Off, every pixel is answered; the paper's pure form then is in whole pixels, too.
     bool checks = true;
     PaperReading paper;
     CheckLimits limits;
 };
+
+// The configuration with everything filled in that is left to the kind of matcher.
+MatcherConfig resolved(const MatcherConfig& config);
 
 // The matcher for images of width x height, usable with up to `lanes` lanes. The arena must outlive it.
 // Throws Refusal (kConfig) for a configuration that cannot work at this size.

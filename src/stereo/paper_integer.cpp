@@ -124,8 +124,9 @@ CostVolume after_rule_two(const CostVolume& costs, const CostVolume& looked_at, 
     return result;
 }
 
-void match_paper_integer(const MatcherConfig& config, ConstLuma left, ConstLuma right,
+void match_paper_integer(const MatcherConfig& given, ConstLuma left, ConstLuma right,
                          const DisparityMap& out) {
+    const MatcherConfig config = resolved(given);
     const int width = left.width;
     const int height = left.height;
     Arena arena;

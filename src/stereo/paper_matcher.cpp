@@ -115,7 +115,7 @@ struct PaperMatcher::Pair {
 
 PaperMatcher::PaperMatcher(const MatcherConfig& config, int width, int height, int lanes, Arena& arena,
                            int band_rows)
-    : config_(config),
+    : config_(resolved(config)),
       taps_(window_taps(config.paper.window)),
       width_(width),
       height_(height),

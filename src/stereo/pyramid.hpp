@@ -12,9 +12,10 @@ namespace groundline::stereo {
 //
 // Thin: what is 5 px wide near the camera is 2.5 px wide there and drowns in its surroundings. So every pixel
 // of every kThinStep-th row looks for a disparity at least kThinNearer px nearer than predicted, by a window
-// of 3 px times kThinRows such rows (poles and trunks stand upright) and by the kNarrowPairs of
-// the census. Where the best of them is better than half of what the prediction reaches, and good
-// in itself, it becomes the prediction.
+// of 3 px times kThinRows such rows (poles and trunks stand upright) and by the kNarrowPairs of the census.
+// Where the best of them costs less than half of what the prediction reaches, and is good in
+// itself, it becomes the prediction. At the edges of a thin thing that window sees the background as well; so
+// a pixel beside one that was found follows it if its own column of the window alone prefers that.
 //
 // Fine: around each prediction, within kFineReachQ4, the lowest cost of a 7x7 window of narrow pairs plus the
 // distance from the prediction in 1/16 px. All sixteen pairs would take off 0.4 points of bad-1 on KITTI and

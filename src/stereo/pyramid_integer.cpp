@@ -44,6 +44,12 @@ class Pyramid {
     }
 
   private:
+    struct Thin {
+        int x;
+        int row;
+        int index;
+    };
+
     std::size_t index(int x, int y) const {
         return static_cast<std::size_t>(std::clamp(y, 0, left_.height - 1)) *
                    static_cast<std::size_t>(left_.width) +
@@ -80,42 +86,72 @@ class Pyramid {
         return ((prediction_.q4[index(x, y)] + kDisparityOne / 2) >> 4) - config_.min_disparity;
     }
 
-    // Cost of the tall narrow window at sampled row `row`.
-    int thin_cost(int x, int row, int k) const {
+    // Cost of one column of the tall window at sampled row `row`.
+    int column_cost(int x, int row, int k) const {
         const int rows = (left_.height + kThinStep - 1) / kThinStep;
         int sum = 0;
         for (int j = -kThinRows / 2; j < kThinRows / 2; ++j)
-            for (int i = -1; i <= 1; ++i)
-                sum += difference(x + i, kThinStep * std::clamp(row + j, 0, rows - 1), k);
+            sum += difference(x, kThinStep * std::clamp(row + j, 0, rows - 1), k);
         return sum;
+    }
+    int thin_cost(int x, int row, int k) const {
+        return column_cost(x - 1, row, k) + column_cost(x, row, k) + column_cost(x + 1, row, k);
+    }
+    bool inside_right(int x, int k) const {
+        const int match = x - config_.min_disparity - k;
+        return match >= 0 && match < left_.width;
+    }
+
+    // Index of a nearer thing at x, 0 if none is found.
+    int thin_at(int x, int row) const {
+        const int predicted = predicted_index(x, kThinStep * row);
+        int at_prediction = 255;
+        int nearer = 255;
+        int index = 0;
+        for (int k = 0; k <= last_; ++k) {
+            const int cost = thin_cost(x, row, k);
+            if (std::abs(k - predicted) <= kThinPredictedWithin)
+                at_prediction = std::min(at_prediction, cost);
+            if (k - predicted >= kThinNearer && cost < nearer) {
+                nearer = cost;
+                index = k;
+            }
+        }
+        const bool good = 2 * nearer < at_prediction && nearer <= kThinHighest && inside_right(x, index);
+        return good ? index : 0;
+    }
+
+    // Whether x, which saw nothing itself, belongs to the thing found beside it.
+    bool follows(int x, int row, int index) const {
+        const int predicted = predicted_index(x, kThinStep * row);
+        if (index == 0 || index - predicted < kThinNearer || !inside_right(x, index)) return false;
+        int at_prediction = 255;
+        for (int k = std::max(0, predicted - kThinPredictedWithin);
+             k <= std::min(last_, predicted + kThinPredictedWithin); ++k)
+            at_prediction = std::min(at_prediction, column_cost(x, row, k));
+        return column_cost(x, row, index) < at_prediction;
     }
 
     void replace_by_thin() {
         const int rows = (left_.height + kThinStep - 1) / kThinStep;
-        for (int row = 0; row < rows; ++row)
+        std::vector<Thin> thin;
+        for (int row = 0; row < rows; ++row) {
+            std::vector<int> found(static_cast<std::size_t>(left_.width) + 2, 0);  // x + 1
+            for (int x = 0; x < left_.width; ++x)
+                found[static_cast<std::size_t>(x + 1)] = thin_at(x, row);
             for (int x = 0; x < left_.width; ++x) {
-                const int predicted = predicted_index(x, kThinStep * row);
-                int at_prediction = 255;
-                int nearer = 255;
-                int nearer_index = 0;
-                for (int k = 0; k <= last_; ++k) {
-                    const int cost = thin_cost(x, row, k);
-                    if (std::abs(k - predicted) <= kThinPredictedWithin)
-                        at_prediction = std::min(at_prediction, cost);
-                    if (k - predicted >= kThinNearer && cost < nearer) {
-                        nearer = cost;
-                        nearer_index = k;
-                    }
-                }
-                const int match = x - config_.min_disparity - nearer_index;
-                if (2 * nearer >= at_prediction || nearer > kThinHighest || match < 0 || match >= left_.width)
-                    continue;
-                thin_.push_back({x, row, nearer_index});
+                const auto at = static_cast<std::size_t>(x + 1);
+                const int beside = std::max(found[at - 1], found[at + 1]);
+                if (found[at] != 0)
+                    thin.push_back({x, row, found[at]});
+                else if (follows(x, row, beside))
+                    thin.push_back({x, row, beside});
             }
-        for (const Thin& thin : thin_)
-            for (int y = kThinStep * thin.row; y < std::min(kThinStep * (thin.row + 1), left_.height); ++y) {
-                prediction_.q4[index(thin.x, y)] = kDisparityOne * (config_.min_disparity + thin.index);
-                prediction_.against[index(thin.x, y)] = Invalid::kNone;
+        }
+        for (const Thin& each : thin)
+            for (int y = kThinStep * each.row; y < std::min(kThinStep * (each.row + 1), left_.height); ++y) {
+                prediction_.q4[index(each.x, y)] = kDisparityOne * (config_.min_disparity + each.index);
+                prediction_.against[index(each.x, y)] = Invalid::kNone;
             }
     }
 
@@ -192,12 +228,6 @@ class Pyramid {
         }
     }
 
-    struct Thin {
-        int x;
-        int row;
-        int index;
-    };
-
     MatcherConfig config_;
     ConstLuma left_;
     ConstLuma right_;
@@ -205,7 +235,6 @@ class Pyramid {
     std::vector<std::uint16_t> left_words_;
     std::vector<std::uint16_t> right_words_;
     Prediction prediction_;
-    std::vector<Thin> thin_;
 };
 
 }  // namespace
@@ -223,7 +252,7 @@ void halve(ConstLuma image, Luma half) {
 
 void match_pyramid_integer(const MatcherConfig& config, ConstLuma left, ConstLuma right,
                            const DisparityMap& out) {
-    Pyramid(config, left, right).match(out);
+    Pyramid(resolved(config), left, right).match(out);
 }
 
 }  // namespace groundline::stereo

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cassert>
 #include <cstring>
 
@@ -112,7 +113,7 @@ struct PyramidMatcher::Lane {
 };
 
 PyramidMatcher::PyramidMatcher(const MatcherConfig& config, int width, int height, int lanes, Arena& arena)
-    : config_(config), width_(width), height_(height) {
+    : config_(resolved(config)), width_(width), height_(height) {
     const std::size_t before = arena.bytes();
     half_left_ = arena.image<std::uint8_t>(halved(width), halved(height));
     half_right_ = arena.image<std::uint8_t>(halved(width), halved(height));
@@ -188,6 +189,36 @@ void PyramidMatcher::find_thin(ConstLuma left, ConstLuma right, const Part& part
                              .predicted_stride = lane.index.stride,
                              .nearer = thin_.row(first) + x,
                              .nearer_stride = thin_.stride});
+    for (int r = 0; r < count; ++r)
+        widen_thin(looked_at.data() + r, lane.index.row(r), thin_.row(first + r));
+}
+
+// Adds the edges of what was found in one sampled row; `rows` are the kThinRows rows of its window.
+void PyramidMatcher::widen_thin(const kernels::CensusPair* rows, const std::uint8_t* predicted,
+                                std::uint8_t* thin) const {
+    const auto column_cost = [&](int x, int k) {
+        int sum = 0;
+        for (int j = 0; j < kThinRows; ++j)
+            sum += std::popcount(
+                static_cast<std::uint8_t>(rows[j].left[x] ^ rows[j].right[x - config_.min_disparity - k]));
+        return sum;
+    };
+    const auto follows = [&](int x, int index) {
+        const int match = x - config_.min_disparity - index;
+        if (index - predicted[x] < kThinNearer || match < 0 || match >= width_) return false;
+        const int last = std::min(config_.disparities - 1, predicted[x] + kThinPredictedWithin);
+        int at_prediction = 255;
+        for (int k = std::max(0, predicted[x] - kThinPredictedWithin); k <= last; ++k)
+            at_prediction = std::min(at_prediction, column_cost(x, k));
+        return column_cost(x, index) < at_prediction;
+    };
+    int before = 0;  // what was found at x - 1, not what was added there
+    for (int x = 0; x < width_; ++x) {
+        const int here = thin[x];
+        const int beside = std::max<int>(before, x + 1 < width_ ? thin[x + 1] : 0);
+        before = here;
+        if (here == 0 && beside != 0 && follows(x, beside)) thin[x] = static_cast<std::uint8_t>(beside);
+    }
 }
 
 void PyramidMatcher::refine(ConstLuma left, ConstLuma right, const Part& part, Lane& lane,

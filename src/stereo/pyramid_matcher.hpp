@@ -12,7 +12,8 @@ namespace groundline::stereo {
 
 namespace kernels {
 struct Prediction;
-}
+struct CensusPair;
+}  // namespace kernels
 
 class PyramidMatcher final : public Matcher {
   public:
@@ -30,6 +31,7 @@ class PyramidMatcher final : public Matcher {
     struct Part;
 
     void find_thin(ConstLuma left, ConstLuma right, const Part& part, Lane& lane) const;
+    void widen_thin(const kernels::CensusPair* rows, const std::uint8_t* predicted, std::uint8_t* thin) const;
     void refine(ConstLuma left, ConstLuma right, const Part& part, Lane& lane, const DisparityMap& out) const;
     void predict(int y, bool with_thin, const kernels::Prediction& out) const;
     void answer(int y, Lane& lane, const DisparityMap& out) const;

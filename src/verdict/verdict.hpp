@@ -14,6 +14,7 @@ struct PhotometricLimits {
     double max_gain = 1.0;      // of the brighter over the darker camera
     double max_offset = 0.0;    // grey levels, either sign
     double max_mismatch = 0.0;  // mean difference of matching brightness ranks, grey levels
+    bool operator==(const PhotometricLimits&) const = default;
 };
 // For matchers that compare grey levels as they are: a cost truncated at 4 % (10 levels) finds nothing at
 // gain 1.06 with offset 4, which is a mismatch of about 11 levels; half the truncation still leaves contrast.

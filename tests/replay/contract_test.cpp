@@ -68,7 +68,7 @@ TEST(Contract, WritesEveryFileOfEveryFrame) {
     EXPECT_EQ(lines(folder / "out/timing.jsonl").size(), 3U);
     const Json summary = Json::parse(std::ifstream(folder / "out/summary.json"));
     EXPECT_EQ(summary.at("complete"), true);
-    EXPECT_EQ(summary.at("settings").at("stereo.matcher"), "paper");
+    EXPECT_EQ(summary.at("settings").at("stereo.matcher"), "census_pyramid");
     EXPECT_EQ(summary.at("counters").at("results_delivered"), 3);
 }
 

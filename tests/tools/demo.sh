@@ -14,7 +14,6 @@ results=demo
 package=python3-skimage # its motorcycle pair: Middlebury 2014, a quarter of the size, with truth
 data=../shared/data
 frames=10
-matcher=(--set stereo.matcher=paper --set stereo.normalise=local_mean)
 mkdir -p "$inputs" "$results"
 scratch=$(mktemp -d "$inputs/.scratch-XXXXXX")
 trap 'rm -rf "$scratch"' EXIT
@@ -58,8 +57,8 @@ CALIBRATION
 # replay NAME SOURCE [TRUTH]
 replay() {
     echo
-    echo "== $1: groundline replay $2 ${matcher[*]} --out $results/$1"
-    "$groundline" replay "$2" "${matcher[@]}" --out "$results/$1"
+    echo "== $1: groundline replay $2 --out $results/$1"
+    "$groundline" replay "$2" --out "$results/$1"
     if [[ -n ${3:-} ]]; then
         echo "== $1: groundline evaluate $3 $results/$1"
         "$groundline" evaluate "$3" "$results/$1"

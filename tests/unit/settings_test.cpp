@@ -162,10 +162,43 @@ TEST(Mount, HalfAMountIsRefusedAndAWholeOneNarrowsTheGate) {
 TEST(Terrain, WholeDisparitiesAreTrustedHalfAsMuch) {
     Settings settings;
     const double subpixel_px = terrain_config(settings).sigma_disparity_px;
-    for (const char* word : {"stereo.checks=off", "stereo.subpixel=off"}) {
-        Settings whole;
-        set_word(whole, word);
-        EXPECT_EQ(terrain_config(whole).sigma_disparity_px, 2.0 * subpixel_px) << word;
+    const auto sigma_px = [](const char* matcher, const char* word) {
+        Settings settings_then;
+        set_word(settings_then, matcher);
+        set_word(settings_then, word);
+        return terrain_config(settings_then).sigma_disparity_px;
+    };
+    for (const char* matcher :
+         {"stereo.matcher=paper", "stereo.matcher=census", "stereo.matcher=census_pyramid"})
+        EXPECT_EQ(sigma_px(matcher, "stereo.subpixel=off"), 2.0 * subpixel_px) << matcher;
+    // Without checks the paper's matcher alone stays with whole disparities.
+    EXPECT_EQ(sigma_px("stereo.matcher=paper", "stereo.checks=off"), 2.0 * subpixel_px);
+    EXPECT_EQ(sigma_px("stereo.matcher=census", "stereo.checks=off"), subpixel_px);
+}
+
+TEST(Verdict, BrightnessIsJudgedAsTheMatcherSeesIt) {
+    const auto photometric = [](std::initializer_list<const char*> words) {
+        Settings settings;
+        for (const char* word : words)
+            set_word(settings, word);
+        return verdict_limits(settings).photometric;
+    };
+    EXPECT_EQ(photometric({}), verdict::kLocalOrder);
+    EXPECT_EQ(photometric({"stereo.matcher=census"}), verdict::kLocalOrder);
+    EXPECT_EQ(photometric({"stereo.matcher=paper"}), verdict::kRawDifferences);
+    EXPECT_EQ(photometric({"stereo.matcher=paper", "stereo.normalise=local_mean"}), verdict::kLocalOrder);
+}
+
+TEST(Keys, WhatIsLeftToTheMatcherSaysSo) {
+    Settings settings;
+    for (const char* name : {"stereo.saturated_percent", "stereo.uniqueness_percent"}) {
+        const Key* key = find_key(name);
+        EXPECT_EQ(key->print(settings), "auto");
+        EXPECT_TRUE(key->parse(settings, "12"));
+        EXPECT_EQ(key->print(settings), "12");
+        EXPECT_FALSE(key->parse(settings, "-2"));
+        EXPECT_TRUE(key->parse(settings, "auto"));
+        EXPECT_EQ(key->print(settings), "auto");
     }
 }
 

@@ -16,7 +16,7 @@ using test::OwnedLuma;
 using test::OwnedPair;
 
 MatcherConfig checked(int disparities) {
-    MatcherConfig config;
+    MatcherConfig config = paper();
     config.disparities = disparities;
     return config;
 }

@@ -18,7 +18,7 @@ struct Size {
 
 // What a configuration makes of a pair, stated plainly.
 struct Expectation {
-    MatcherConfig config;
+    MatcherConfig config = paper();
     const OwnedPair* pair;
     OwnedResult plain;
 
@@ -65,7 +65,7 @@ TEST(PaperMatcher, C7_EqualsThePlainFormAtOddSizesAndStrides) {
     std::vector<Expectation> expectations;
     for (const OwnedPair& pair : pairs)
         for (const bool normalise : {false, true}) {
-            MatcherConfig config;
+            MatcherConfig config = paper();
             config.disparities = pair.left.width() > 64 ? 64 : 16;
             config.normalise_local_mean = normalise;
             expectations.emplace_back(config, pair);
@@ -77,7 +77,7 @@ TEST(PaperMatcher, C7_EqualsThePlainFormOnPureNoiseAndAtEveryOffset) {
     const OwnedPair pair{test::noise_image(83, 37, 102), test::noise_image(83, 37, 103)};
     std::vector<Expectation> expectations;
     for (const int offset : {-82, -40, -9, 0, 6, 30, 50}) {
-        MatcherConfig config;
+        MatcherConfig config = paper();
         config.min_disparity = offset;
         config.disparities = 32;
         config.limits.speckle_px = 3;
@@ -99,7 +99,7 @@ TEST(PaperMatcher, C7_EqualsThePlainFormWhereEveryTestBites) {
         });
     }
     for (const bool normalise : {false, true}) {
-        MatcherConfig config;
+        MatcherConfig config = paper();
         config.disparities = 32;
         config.min_disparity = -12;  // the nearer surface, 19 px, is the last of the range
         config.normalise_local_mean = normalise;
@@ -115,7 +115,7 @@ TEST(PaperMatcher, C7_EqualsThePlainFormWhereEveryTestBites) {
 
 TEST(PaperMatcher, C7_ResultDependsNeitherOnLanesNorOnTheirOrderNorOnBands) {
     const OwnedPair pair = stepped_pair(130, 77, 104);
-    MatcherConfig config;
+    MatcherConfig config = paper();
     config.normalise_local_mean = true;
     const OwnedResult expected = match_plain(config, pair.left.view(), pair.right.view());
     for (const int lanes : {1, 2, 3}) {
@@ -142,7 +142,7 @@ TEST(PaperMatcher, C7_ResultDependsNeitherOnLanesNorOnTheirOrderNorOnBands) {
 TEST(PaperMatcher, SecondCallKnowsNothingOfTheFirst) {
     const OwnedPair first = stepped_pair(97, 41, 105);
     const OwnedPair second = stepped_pair(97, 41, 106);
-    MatcherConfig config;
+    MatcherConfig config = paper();
     config.disparities = 32;
     Arena arena;
     Serial serial;
@@ -156,7 +156,7 @@ TEST(PaperMatcher, SecondCallKnowsNothingOfTheFirst) {
 TEST(PaperMatcher, ReportsAbsoluteDisparityForAnySearchRange) {
     for (const int offset : {-20, 0, 25}) {
         const OwnedPair pair = test::shifted_pair(140, 60, 107, offset + 5);
-        MatcherConfig config;
+        MatcherConfig config = paper();
         config.min_disparity = offset;
         config.disparities = 16;
         const OwnedResult result = match_fast(config, pair.left.view(), pair.right.view());
@@ -184,7 +184,7 @@ TEST(PaperMatcher, PureFormAnswersEveryPixelInWholePixels) {
 
 TEST(PaperMatcher, MatchingAllocatesNothing) {
     const OwnedPair pair = stepped_pair(130, 77, 110);
-    MatcherConfig config;
+    MatcherConfig config = paper();
     config.normalise_local_mean = true;
     Arena arena;
     Serial serial;
@@ -198,7 +198,7 @@ TEST(PaperMatcher, MatchingAllocatesNothing) {
 
 TEST(PaperMatcher, StateIsWhatTheArenaGaveAndFarBelowACostVolume) {
     Arena arena;
-    MatcherConfig config;
+    MatcherConfig config = paper();
     const auto matcher = make_matcher(config, 640, 480, 1, arena);
     EXPECT_EQ(matcher->state_bytes(), arena.bytes());
     EXPECT_LT(matcher->state_bytes(), std::size_t{640} * 480 * 64 / 8);
@@ -217,7 +217,7 @@ TEST(PaperMatcher, RefusesWhatCannotWorkWithASentence) {
         }
         return "";
     };
-    MatcherConfig config;
+    MatcherConfig config = paper();
     EXPECT_EQ(refusal(config, 640, 480), "");
     EXPECT_EQ(refusal(config, 65, 11), "");
     EXPECT_NE(refusal(config, 640, 10).find("too small"), std::string::npos);
@@ -226,12 +226,12 @@ TEST(PaperMatcher, RefusesWhatCannotWorkWithASentence) {
         config.disparities = disparities;
         EXPECT_NE(refusal(config, 640, 480).find("multiple of 16"), std::string::npos) << disparities;
     }
-    config = {};
+    config = paper();
     config.min_disparity = -640;
     EXPECT_NE(refusal(config, 640, 480).find("-640"), std::string::npos);
     config.min_disparity = 2040;
     EXPECT_NE(refusal(config, 4000, 480).find("do not fit"), std::string::npos);
-    config = {};
+    config = paper();
     config.paper.truncation = 0;
     EXPECT_NE(refusal(config, 640, 480).find("truncation"), std::string::npos);
 }

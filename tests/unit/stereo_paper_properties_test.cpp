@@ -224,7 +224,7 @@ TEST(PaperProperties, C5_MirroredAndExchangedViewsGiveTheRightReferencedResult) 
 
 TEST(PaperProperties, C6_AConstantAddedToBothViewsChangesNothing) {
     OwnedPair pair = test::shifted_pair(120, 50, 50, 9);
-    MatcherConfig config;
+    MatcherConfig config = paper();
     config.disparities = 32;
     const OwnedResult before = match_fast(config, pair.left.view(), pair.right.view());
     for (OwnedLuma* view : {&pair.left, &pair.right})

@@ -72,9 +72,16 @@ inline int count_reason(const OwnedResult& result, Invalid reason) {
     return count;
 }
 
+// The paper's matcher with everything else at its default.
+inline MatcherConfig paper() {
+    MatcherConfig config;
+    config.kind = MatcherKind::kPaper;
+    return config;
+}
+
 // The paper and nothing else.
 inline MatcherConfig pure(int disparities) {
-    MatcherConfig config;
+    MatcherConfig config = paper();
     config.disparities = disparities;
     config.checks = false;
     return config;
