@@ -635,7 +635,7 @@ TEST(CensusKernels, ThinBlock) {
             int min;
             int count;
         };
-        for (const Range range : {Range{0, 32}, Range{-13, 48}, Range{7, 256}})
+        for (const Range range : {Range{0, 32}, Range{-20, 48}, Range{7, 256}})
             for (const int width : {11, 64, 65, 97, 130})
                 for (const int count : {1, 5, kernels::kMostThinRows}) {
                     if (range.count > 200 && (width != 97 || count != 5)) continue;
@@ -645,7 +645,9 @@ TEST(CensusKernels, ThinBlock) {
                     // Things 1 to 4 px wide before a far background, some of them short.
                     const WordRows words(width, count + kThinRows - 1, range.min, range.count, offset, random,
                                          [&](int x, int r) {
-                                             const bool thing = x % 16 < 1 + x / 16 % 4 && (x < 60 || r < 7);
+                                             const bool at_end = x < 4 || x >= width - 4;
+                                             const bool thing =
+                                                 at_end || (x % 16 < 1 + x / 16 % 4 && (x < 60 || r < 7));
                                              return thing ? near : far;
                                          });
                     const int blocks = whole_blocks(width);

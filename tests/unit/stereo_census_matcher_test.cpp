@@ -114,17 +114,19 @@ TEST_P(CensusMatchers, EqualsThePlainFormWithEveryTestSwitchedOff) {
 }
 
 TEST_P(CensusMatchers, ResultDependsNeitherOnLanesNorOnTheirOrder) {
-    constexpr int kHeight = 290;  // every band, and three parts of the fine level
-    const OwnedPair pair = stepped_pair(81, kHeight, 207);
+    // Every band, three parts of the fine level, and work enough for threads to meet.
+    constexpr int kWidth = 401;
+    constexpr int kHeight = 290;
+    const OwnedPair pair = stepped_pair(kWidth, kHeight, 207);
     const MatcherConfig config = census(GetParam(), 32);
     const OwnedResult expected = match_fast(config, pair.left.view(), pair.right.view());
     for (const int lanes : {1, 2, 3, 4}) {
         Arena arena;
-        const auto matcher = make_matcher(config, 81, kHeight, lanes, arena);
+        const auto matcher = make_matcher(config, kWidth, kHeight, lanes, arena);
         ShuffledLanes shuffled(lanes, 7U + static_cast<std::uint32_t>(lanes));
         ThreadedLanes threaded(lanes);
         for (Parallel* parallel : {static_cast<Parallel*>(&shuffled), static_cast<Parallel*>(&threaded)}) {
-            OwnedResult result(81, kHeight);
+            OwnedResult result(kWidth, kHeight);
             matcher->match(pair.left.view(), pair.right.view(), result.map, *parallel);
             EXPECT_EQ(differing_pixels(result, expected), 0) << lanes << " lanes";
         }

@@ -211,7 +211,7 @@ TEST_P(CensusProperties, SaturatedAndFlatPatchesGetTheirReasons) {
         });
     const OwnedResult result = match_fast(config(16), pair.left.view(), pair.right.view());
     for (int y = 0; y < 34; ++y) {
-        for (int x = 51; x < 89; ++x)
+        for (int x = 56; x < 84; ++x)
             ASSERT_EQ(result.reason(x, y), Invalid::kSaturation) << x << " " << y;
         for (int x = 117; x < 160; ++x)
             ASSERT_EQ(result.reason(x, y), Invalid::kTexture) << x << " " << y;

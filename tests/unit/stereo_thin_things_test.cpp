@@ -164,8 +164,11 @@ TEST(ThinThings, NothingIsInventedWhereNothingThinIs) {
             OwnedPair stepped = test::warped_pair(kWidth, kHeight, 400 + seed, steps);
             OwnedPair slanted = test::warped_pair(kWidth, kHeight, 410 + seed, slant);
             OwnedPair noise = test::shifted_pair(kWidth, kHeight, 420 + seed, 12);
+            OwnedPair weak = test::shifted_pair(kWidth, kHeight, 425 + seed, 12);
+            for (OwnedLuma* view : {&weak.left, &weak.right})
+                view->fill([&](int x, int y) { return 100 + view->at(x, y) / 32; });
             std::uint32_t grain = 430 + 10 * seed;
-            for (OwnedPair* pair : {&stepped, &slanted, &noise}) {
+            for (OwnedPair* pair : {&stepped, &slanted, &noise, &weak}) {
                 add_grain(pair->left, grain++);
                 add_grain(pair->right, 100 + grain++);
             }
@@ -173,6 +176,7 @@ TEST(ThinThings, NothingIsInventedWhereNothingThinIs) {
             EXPECT_LT(invented(kind, "steps", stepped, steps), 0.1);
             EXPECT_LT(invented(kind, "slant", slanted, slant), 0.1);
             EXPECT_LT(invented(kind, "much noise", noise, [](int, int) { return 12; }), 0.1);
+            EXPECT_LT(invented(kind, "weak texture", weak, [](int, int) { return 12; }), 1.0);
         }
 }
 
