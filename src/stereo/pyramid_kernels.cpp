@@ -157,7 +157,7 @@ void PredictRowAny(const PredictRow& row, const Prediction& out) {
     const auto low_byte = hn::Set(d, 255);
     const auto none = hn::Zero(d);
     const auto put = [&](auto q4, auto against, int x) HWY_ATTR {
-        q4 = hn::Min(hn::Max(hn::ShiftLeft<1>(q4), least), most);
+        q4 = hn::Min(hn::Max(hn::SaturatedAdd(q4, q4), least), most);
         if (row.thin != nullptr) {
             const auto thin = hn::PromoteTo(d, hn::LoadU(d8, row.thin + x));
             const auto found = hn::Gt(thin, none);
@@ -332,7 +332,7 @@ void FineBlockAny(const FineBlock& block) {
     }
     const V reach = hn::Set(d, kFineReachQ4);
     const V near = hn::Set(d, 1);
-    for (int k = all.first(); k <= std::min(last + 1, all.last()); ++k) {
+    for (int k = all.first(); k <= std::min(last, all.last()) + 1; ++k) {
         std::uint8_t* const here = costs[k % 3];
         const Range wanted = range_of(needed, k);
         if (k <= last && wanted.begin < wanted.end) {

@@ -528,7 +528,7 @@ TEST(CensusKernels, PredictRow) {
         std::mt19937 random(6);
         for (const int width : kWidths)
             for (const int offset : {0, 1, 37})
-                for (const int min_disparity : {-2046, -33, 0, 21, 1700})
+                for (const int min_disparity : {-2046, -33, 0, 21, 1791})
                     for (const int disparities : {16, 64, 256})
                         for (const bool with_thin : {false, true}) {
                             const CoarseRange range = coarse_range(min_disparity, disparities);
@@ -807,7 +807,7 @@ TEST(CensusKernels, FineBlock) {
             int count;
         };
         for (const Range range :
-             {Range{0, 16}, Range{-21, 32}, Range{9, 64}, Range{0, 240}, Range{-1700, 48}})
+             {Range{0, 16}, Range{-21, 32}, Range{9, 64}, Range{0, 256}, Range{-1700, 48}})
             for (const int width : {11, 32, 33, 64, 65, 97, 130})
                 for (const bool checks : {false, true}) {
                     check_fine_block(width, range.min, range.count, checks, random);
