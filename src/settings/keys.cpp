@@ -227,23 +227,25 @@ std::vector<Key> make_keys() {
                           GROUNDLINE_MEMBER(matcher.limits.median)));
     keys.push_back(choice<RuleOne>(
         "stereo.rule_one", {{"mean9", RuleOne::kMean9}, {"sum9", RuleOne::kSum9}, {"off", RuleOne::kOff}},
-        "Reading of the paper's first rule.", GROUNDLINE_MEMBER(matcher.paper.rule_one)));
+        "Paper only: reading of the paper's first rule.", GROUNDLINE_MEMBER(matcher.paper.rule_one)));
     keys.push_back(choice<RuleTwo>("stereo.rule_two",
                                    {{"seven_of_eight", RuleTwo::kSevenOfEight},
                                     {"seven_of_nine", RuleTwo::kSevenOfNine},
                                     {"off", RuleTwo::kOff}},
-                                   "Reading of the paper's second rule.",
+                                   "Paper only: reading of the paper's second rule.",
                                    GROUNDLINE_MEMBER(matcher.paper.rule_two)));
-    keys.push_back(on_off("stereo.rules_at_once",
-                          "The second rule judges the costs from before the first, not from after it.",
-                          GROUNDLINE_MEMBER(matcher.paper.rules_at_once)));
+    keys.push_back(
+        on_off("stereo.rules_at_once",
+               "Paper only: the second rule judges the costs from before the first, not from after it.",
+               GROUNDLINE_MEMBER(matcher.paper.rules_at_once)));
     keys.push_back(choice<Window>(
         "stereo.window", {{"gauss5", Window::kGauss5}, {"gauss5.5", Window::kGauss55}, {"box", Window::kBox}},
-        "Weights of the 11x11 window: sigma 5/3 (the paper's), 5.5/3, or equal.",
+        "Paper only: weights of the 11x11 window: sigma 5/3 (the paper's), 5.5/3, or equal.",
         GROUNDLINE_MEMBER(matcher.paper.window)));
-    keys.push_back(whole("stereo.truncation", 1, 28,
-                         "Most grey levels that one pixel adds to a cost; the paper's 4 % are 10.",
-                         GROUNDLINE_MEMBER(matcher.paper.truncation)));
+    keys.push_back(
+        whole("stereo.truncation", 1, 28,
+              "Paper only: most grey levels that one pixel adds to a cost; the paper's 4 % are 10.",
+              GROUNDLINE_MEMBER(matcher.paper.truncation)));
 
     keys.push_back(tolerance_key());
     keys.push_back(number("terrain.tolerance_ratio", 0.01, 0.9,

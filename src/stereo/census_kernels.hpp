@@ -35,7 +35,7 @@ struct CensusRow {
 void census_row(const std::array<const std::uint8_t*, 2 * kCensusReachY + 1>& rows, int width, bool mirrored,
                 const CensusRow& out);
 
-// out[i] = in[width - 1 - i]. Reads up to kWidestVector bytes behind the last pixel; writes so many.
+// out[i] = in[width - 1 - i].
 void mirror_row(const std::uint8_t* in, int width, std::uint8_t* out);
 
 // Of each pixel of one row: the winning disparity's index, its sum, and the sums beside it.

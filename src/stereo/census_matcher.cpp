@@ -68,7 +68,7 @@ CensusMatcher::CensusMatcher(const MatcherConfig& config, int width, int height,
     }
     const std::size_t before = arena.bytes();
     lanes_.reserve(static_cast<std::size_t>(lanes));
-    for (int lane = 0; lane < std::min(lanes, band_count(height)); ++lane)
+    for (int lane = 0; lane < lanes; ++lane)
         lanes_.emplace_back(config_, width, arena);
     if (config_.checks && config_.limits.speckle_px > 0) speckles_ = SpeckleScratch(width, arena);
     if (config_.checks && config_.limits.median)
@@ -81,6 +81,7 @@ CensusMatcher::~CensusMatcher() = default;
 void CensusMatcher::match(ConstLuma left, ConstLuma right, const DisparityMap& out, Parallel& parallel) {
     assert(left.same_size(width_, height_) && right.same_size(width_, height_));
     assert(out.disparity_q4.same_size(width_, height_) && out.invalid.same_size(width_, height_));
+    assert(static_cast<std::size_t>(parallel.lanes()) <= lanes_.size());
     parallel.for_each(band_count(height_), [&](int number, int lane) {
         match_band(left, right, number, lanes_[static_cast<std::size_t>(lane)], out);
     });

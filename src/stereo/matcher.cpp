@@ -38,7 +38,7 @@ void check(const MatcherConfig& config, int width, int height) {
         if (config.normalise_local_mean)
             refuse(
                 "the local mean is taken out for the paper's matcher alone: census words do not depend on "
-                "brightness, so switch the normalisation off or choose the paper's matcher");
+                "brightness; set stereo.normalise=off, or stereo.matcher=paper");
         if (width > kernels::kMostCensusWidth)
             refuse("images of " + size + " px are too wide for the census matchers: at most " +
                    std::to_string(kernels::kMostCensusWidth) + " px");

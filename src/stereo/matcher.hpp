@@ -21,9 +21,11 @@ class Matcher {
     Matcher& operator=(const Matcher&) = delete;
     virtual ~Matcher() = default;
 
-    // Matches one rectified pair. All views have the size given at construction; `out` is written whole.
-    // `parallel` may have at most the lanes given at construction. The result depends on the pixels and the
-    // configuration alone. No allocation, no exception; one call at a time.
+    // Matches one rectified pair. All views have the size given at construction and keep the padding contract
+    // of image.hpp: kRowPadding bytes behind each row of `out` may be written, as many behind the last row of
+    // the views be read; the arena's images have them. `out` is written whole. `parallel` may have at most
+    // the lanes given at construction. The result depends on the pixels and the configuration alone. No
+    // allocation, no exception; one call at a time.
     virtual void match(ConstLuma left, ConstLuma right, const DisparityMap& out, Parallel& parallel) = 0;
 
     // Memory taken from the arena at construction.

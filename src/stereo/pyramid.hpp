@@ -20,7 +20,9 @@ namespace groundline::stereo {
 // Fine: around each prediction, within kFineReachQ4, the lowest cost of a 7x7 window of narrow pairs plus the
 // distance from the prediction in 1/16 px. All sixteen pairs would take off 0.4 points of bad-1 on KITTI and
 // nothing of bad-3, and take half as long again. With the checks on, pixels that the coarse level has a
-// reason against keep it: they are not refined and have no say in the left-right check.
+// reason against keep it: they are not refined and have no
+// say in the left-right check. Uniqueness is judged at the coarse level alone, left-right at both, in px of
+// each. The last coarse disparity stands for two, so the range edge may be the last two disparities.
 inline constexpr int kThinStep = 4;
 inline constexpr int kThinRows = 8;
 inline constexpr int kThinNearer = 4;

@@ -9,9 +9,9 @@
 
 namespace groundline::stereo::kernels {
 
-// Both kernels work on blocks of so many pixels of several rows, disparity after disparity, pixels side by
-// side in vectors. Rows are read from kBlockMargin before the first pixel of a block to kBlockMargin behind
-// the last and must be readable there; what lies outside the image has no effect.
+// thin_block() and fine_block() work on blocks of so many pixels of several rows, disparity after disparity,
+// pixels side by side in vectors. Rows are read from kBlockMargin before the first pixel of a block to
+// kBlockMargin behind the last and must be readable there; what lies outside the image has no effect.
 inline constexpr int kBlock = 64;
 inline constexpr int kBlockMargin = 16;
 

@@ -17,6 +17,8 @@ std::vector<VectorUnit> vector_units() {
     hwy::SetSupportedTargetsForTest(0);
     std::vector<VectorUnit> units = hwy::SupportedAndGeneratedTargets();
     if (in_use != hwy::SupportedTargets()) hwy::SetSupportedTargetsForTest(in_use);
+    if (units.empty())
+        units.push_back(HWY_STATIC_TARGET);  // built for one alone, which Highway does not look for
     return units;
 }
 
@@ -25,7 +27,8 @@ const char* name_of(VectorUnit unit) {
 }
 
 VectorUnit vector_unit_in_use() {
-    return hwy::SupportedAndGeneratedTargets().front();
+    const std::vector<VectorUnit> units = hwy::SupportedAndGeneratedTargets();
+    return units.empty() ? HWY_STATIC_TARGET : units.front();
 }
 
 void use_vector_unit(VectorUnit unit) {

@@ -12,6 +12,7 @@ namespace groundline {
 // Prints which ran, so that a log says what was proved where.
 template <typename Check>
 void on_every_vector_unit(Check check) {
+    ASSERT_FALSE(stereo::vector_units().empty());
     for (const stereo::VectorUnit unit : stereo::vector_units()) {
         SCOPED_TRACE(stereo::name_of(unit));
         std::printf("vector unit %s\n", stereo::name_of(unit));

@@ -114,23 +114,31 @@ TEST_P(CensusMatchers, EqualsThePlainFormWithEveryTestSwitchedOff) {
 }
 
 TEST_P(CensusMatchers, ResultDependsNeitherOnLanesNorOnTheirOrder) {
-    // Every band, three parts of the fine level, and work enough for threads to meet.
-    constexpr int kWidth = 401;
-    constexpr int kHeight = 290;
-    const OwnedPair pair = stepped_pair(kWidth, kHeight, 207);
-    const MatcherConfig config = census(GetParam(), 32);
-    const OwnedResult expected = match_fast(config, pair.left.view(), pair.right.view());
-    for (const int lanes : {1, 2, 3, 4}) {
-        Arena arena;
-        const auto matcher = make_matcher(config, kWidth, kHeight, lanes, arena);
-        ShuffledLanes shuffled(lanes, 7U + static_cast<std::uint32_t>(lanes));
-        ThreadedLanes threaded(lanes);
-        for (Parallel* parallel : {static_cast<Parallel*>(&shuffled), static_cast<Parallel*>(&threaded)}) {
-            OwnedResult result(kWidth, kHeight);
-            matcher->match(pair.left.view(), pair.right.view(), result.map, *parallel);
-            EXPECT_EQ(differing_pixels(result, expected), 0) << lanes << " lanes";
+    // Every band and three parts of the fine level; then fewer bands and parts than lanes.
+    for (const int height : {290, 75}) {
+        constexpr int kWidth = 401;
+        const OwnedPair pair = stepped_pair(kWidth, height, 207);
+        const MatcherConfig config = census(GetParam(), 32);
+        const OwnedResult expected = match_fast(config, pair.left.view(), pair.right.view());
+        for (const int lanes : {1, 2, 3, 4, 5, 8}) {
+            Arena arena;
+            const auto matcher = make_matcher(config, kWidth, height, lanes, arena);
+            ShuffledLanes shuffled(lanes, 7U + static_cast<std::uint32_t>(lanes));
+            ThreadedLanes threaded(lanes);
+            for (Parallel* parallel :
+                 {static_cast<Parallel*>(&shuffled), static_cast<Parallel*>(&threaded)}) {
+                OwnedResult result(kWidth, height);
+                matcher->match(pair.left.view(), pair.right.view(), result.map, *parallel);
+                EXPECT_EQ(differing_pixels(result, expected), 0) << lanes << " lanes, " << height << " rows";
+            }
         }
     }
+}
+
+TEST_P(CensusMatchers, FindsTheLastOfAllDisparities) {
+    const OwnedPair pair = test::warped_pair(330, 24, 220, [](int, int) { return 255; });
+    for (const bool checks : {false, true})
+        expect_equal(census(GetParam(), 256, checks), pair.left.view(), pair.right.view(), "256 disparities");
 }
 
 TEST_P(CensusMatchers, SecondCallKnowsNothingOfTheFirst) {

@@ -127,12 +127,11 @@ TEST(ThinThings, ATallPoleIsFoundInMostOfItsRows) {
     mean_of(config_of(MatcherKind::kCensusPyramid), 4, 120);
 }
 
-TEST(ThinThings, OfAPoleOf40RowsTheSpecklesTakeWhatWasFound) {
+TEST(ThinThings, OfAPoleOf40RowsTheSpecklesTakeMostOfWhatWasFound) {
     const Seen seen = mean_of(config_of(MatcherKind::kCensusPyramid, 0), 5, 40);
-    mean_of(config_of(MatcherKind::kCensusPyramid), 5, 40);
-    mean_of(config_of(MatcherKind::kCensusPyramid, 0), 4, 120);
-    mean_of(config_of(MatcherKind::kCensus), 5, 40);
+    const Seen left_over = mean_of(config_of(MatcherKind::kCensusPyramid), 5, 40);
     EXPECT_GE(seen.rows, 45.0);
+    EXPECT_LT(left_over.rows, seen.rows / 2);
 }
 
 // Percent of the answered that are nearer than the truth by more than 3 px.
@@ -206,7 +205,6 @@ TEST(ThinThings, AFenceIsNotTakenForANearerOne) {
             const double share = invented(kind, alike ? "fence of equal pickets" : "fence", pair,
                                           [](int, int) { return kFence; });
             EXPECT_LT(share, alike ? 12.0 : 0.5);
-            EXPECT_LT(share, 100.0);
         }
 }
 
