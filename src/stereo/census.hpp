@@ -36,8 +36,8 @@ inline constexpr int kCensusReachX = 4;
 inline constexpr int kCensusReachY = 3;
 
 // Costs of a step of one disparity and of a larger one along a path, where the cost of a pixel is 0 .. 32.
-// Of the pairs tried, (10, 60) was best on the five Middlebury sets; KITTI would take larger ones still, but
-// they cost thin obstacles.
+// From (10, 40) to (12, 72) Middlebury is alike (bad-1 6.6 to 6.7 %). KITTI takes larger ones (bad-3 6.7 % at
+// (10, 40), 5.4 at (10, 60), 4.9 at (10, 90)), thin obstacles smaller ones.
 inline constexpr int kSmallStep = 10;
 inline constexpr int kLargeStep = 60;
 
