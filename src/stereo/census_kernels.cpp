@@ -446,7 +446,8 @@ HWY_INLINE void AnswerRowOf(const CensusAnswer& how, const CensusWinners& winner
         const std::uint16_t* const voted = winners.at_right + last;
         std::uint8_t* const at_right = how.at_right;
         const int count = how.width;
-        for (int x = 0; x < count; ++x)
+        HWY_UNROLL(4)
+        for (std::ptrdiff_t x = 0; x < count; ++x)
             at_right[x] = static_cast<std::uint8_t>(255 - (voted[x - index[x]] & 255));
     }
     const V16s last_index = hn::Set(d, static_cast<std::int16_t>(last));

@@ -201,8 +201,10 @@ void VoteRowAny(int width, int disparities, const std::uint8_t* against, const C
     }
     std::uint16_t* const at_right = winners.at_right + disparities - 1;
     std::fill_n(winners.at_right, width + disparities - 1, std::uint16_t{0xFFFF});
-    for (int x = 0; x < width; ++x) {
-        std::uint16_t& there = at_right[x - winners.index[x]];
+    const std::uint8_t* const index = winners.index;
+    HWY_UNROLL(4)
+    for (std::ptrdiff_t x = 0; x < width; ++x) {
+        std::uint16_t& there = at_right[x - index[x]];
         there = std::min(there, keys[x]);
     }
 }
