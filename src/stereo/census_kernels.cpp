@@ -20,7 +20,7 @@ using V16 = hn::Vec<Bytes16>;
 
 // The blocks of `v` one place up; `fill` comes in at the bottom.
 template <class D, class V>
-HWY_INLINE V BlocksUp(D d, V v, V fill) {
+HWY_INLINE V BlocksUp([[maybe_unused]] D d, [[maybe_unused]] V v, V fill) {
     if constexpr (hn::MaxLanes(d) == 16)
         return fill;
     else
@@ -29,7 +29,7 @@ HWY_INLINE V BlocksUp(D d, V v, V fill) {
 
 // The blocks of `v` one place down; `fill` comes in at the top.
 template <class D, class V>
-HWY_INLINE V BlocksDown(D d, V v, V fill) {
+HWY_INLINE V BlocksDown([[maybe_unused]] D d, [[maybe_unused]] V v, V fill) {
     if constexpr (hn::MaxLanes(d) == 16)
         return fill;
     else
@@ -54,7 +54,7 @@ HWY_INLINE V16 FoldToBlock(Bytes16 /*d*/, V v) {
     return v;
 }
 template <class D, class V>
-HWY_INLINE V16 FoldToBlock(D d, V v) {
+HWY_INLINE V16 FoldToBlock([[maybe_unused]] D d, V v) {
     const hn::Half<D> half;
     return FoldToBlock(half, hn::Min(hn::LowerHalf(half, v), hn::UpperHalf(half, v)));
 }
@@ -80,7 +80,7 @@ HWY_INLINE std::uint8_t FirstByte(V16 v) {
 
 // Its lowest byte in every byte of a D.
 template <class D>
-HWY_INLINE hn::Vec<D> SpreadFirst(D d, V16 v) {
+HWY_INLINE hn::Vec<D> SpreadFirst([[maybe_unused]] D d, V16 v) {
     if constexpr (hn::MaxLanes(d) == 16) {
         return hn::TableLookupBytes(v, hn::Zero(d));
     } else {
