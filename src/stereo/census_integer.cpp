@@ -1,6 +1,7 @@
 #include "stereo/census_integer.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cstdlib>
 
 #include "stereo/census.hpp"
@@ -17,13 +18,6 @@ void for_each_cost(const CostVolume& volume, F f) {
         for (int x = 0; x < volume.width; ++x)
             for (int k = 0; k < volume.disparities; ++k)
                 f(x, y, k);
-}
-
-int bits_in(unsigned word) {
-    int count = 0;
-    for (; word != 0; word &= word - 1)
-        ++count;
-    return count;
 }
 
 // One step along a path, from (px, py) to (x, y).
@@ -70,7 +64,7 @@ CostVolume census_costs(ConstLuma left, ConstLuma right, int min_disparity, int 
     for_each_cost(costs, [&](int x, int y, int k) {
         const unsigned differing =
             static_cast<unsigned>(left_words[index(x, y)] ^ right_words[index(x - min_disparity - k, y)]);
-        costs.at(x, y, k) = static_cast<std::uint16_t>(2 * bits_in(differing));
+        costs.at(x, y, k) = static_cast<std::uint16_t>(2 * std::popcount(differing));
     });
     return costs;
 }

@@ -1,6 +1,7 @@
 #include "stereo/pyramid_integer.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cstdlib>
 
 #include "core/arena.hpp"
@@ -11,13 +12,6 @@
 
 namespace groundline::stereo {
 namespace {
-
-int bits_in(unsigned word) {
-    int count = 0;
-    for (; word != 0; word &= word - 1)
-        ++count;
-    return count;
-}
 
 // Prediction of each pixel, 1/16 px, and the coarse level's reason against it.
 struct Prediction {
@@ -60,7 +54,7 @@ class Pyramid {
         x = std::clamp(x, 0, left_.width - 1);
         const unsigned a = left_words_[index(x, y)];
         const unsigned b = right_words_[index(x - config_.min_disparity - k, y)];
-        return bits_in((a ^ b) & kNarrowPairs);
+        return std::popcount((a ^ b) & kNarrowPairs);
     }
 
     void predict() {

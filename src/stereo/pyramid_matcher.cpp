@@ -119,13 +119,13 @@ PyramidMatcher::PyramidMatcher(const MatcherConfig& config, int width, int heigh
     half_right_ = arena.image<std::uint8_t>(halved(width), halved(height));
     coarse_map_ = DisparityMap::make(arena, halved(width), halved(height));
     thin_ = arena.image<std::uint8_t>(whole_blocks(width), (height + kThinStep - 1) / kThinStep);
-    coarse_ = std::make_unique<CensusMatcher>(coarse_config(config), halved(width), halved(height), lanes,
+    coarse_ = std::make_unique<CensusMatcher>(coarse_config(config_), halved(width), halved(height), lanes,
                                               arena, CensusMatcher::Use::kCoarse);
     lanes_.reserve(static_cast<std::size_t>(lanes));
     for (int lane = 0; lane < lanes; ++lane)
-        lanes_.emplace_back(config, width, arena);
-    if (config.checks && config.limits.speckle_px > 0) speckles_ = SpeckleScratch(width, arena);
-    if (config.checks && config.limits.median)
+        lanes_.emplace_back(config_, width, arena);
+    if (config_.checks && config_.limits.speckle_px > 0) speckles_ = SpeckleScratch(width, arena);
+    if (config_.checks && config_.limits.median)
         median_rows_ = arena.take<std::int16_t>(2 * static_cast<std::size_t>(width));
     state_bytes_ = arena.bytes() - before;
 }
