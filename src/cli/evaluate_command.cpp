@@ -14,6 +14,7 @@
 
 #include "cli/evaluate_set.hpp"
 #include "cli/matcher_table.hpp"
+#include "cli/terrain_table.hpp"
 #include "cli/truth_sets.hpp"
 #include "core/deterministic_math.hpp"
 #include "core/error.hpp"
@@ -340,6 +341,9 @@ int run_evaluate(const EvaluateOptions& options) {
     if (options.matchers)
         return run_matcher_table({options.suite, options.sets, options.matcher_names, options.conditions,
                                   options.disparities, options.json});
+    if (options.terrain)
+        return run_terrain_table({options.suite.string(), options.sets, options.seeds, options.config,
+                                  options.set, options.threads, options.json});
     return options.suite.empty() ? evaluate_one(options) : evaluate_suite(options);
 }
 

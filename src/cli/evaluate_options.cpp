@@ -67,7 +67,21 @@ void add_evaluate_options(CLI::App& app, EvaluateOptions& options) {
                        "With --matchers: search this many, a multiple of 16 from 16 to 256; default: what a "
                        "replay takes for each set")
             ->check(kDisparities);
-    app.callback([&options, matchers, conditions, disparities] {
+    CLI::Option* terrain = app.add_flag(
+        "--terrain", options.terrain,
+        "With --suite: judge the terrain stage in this process, beside a baseline. The suite is a folder, or "
+        "rendered: synthetic: (all scenes), synthetic:SCENE,..., synthetic:ditches, synthetic:free, "
+        "synthetic:never");
+    CLI::Option* seeds =
+        app.add_option(
+               "--seeds", options.seeds,
+               "With a rendered suite: seeds of each scene; default 20, ditches 200, free 1000 in all")
+            ->check(CLI::Range(1, 1000000));
+    CLI::Option* threads =
+        app.add_option("--threads", options.threads,
+                       "With --terrain: threads that share the frames; default: one a processor")
+            ->check(CLI::Range(1, 256));
+    app.callback([&options, terrain, seeds, threads, matchers, conditions, disparities] {
         options.matchers = matchers->count() > 0;
         const bool pair = !options.truth.empty() && !options.out.empty();
         const bool any = !options.truth.empty() || !options.out.empty();
@@ -80,6 +94,13 @@ void add_evaluate_options(CLI::App& app, EvaluateOptions& options) {
         if (options.matchers && (!options.config.empty() || !options.set.empty()))
             throw CLI::ValidationError("evaluate",
                                        "--config and --set are for replays, which --matchers leaves out");
+        const bool rendered = options.suite.string().starts_with("synthetic:");
+        if (terrain->count() > 0 && (options.suite.empty() || options.matchers))
+            throw CLI::ValidationError("evaluate", "--terrain is for --suite, without --matchers");
+        if (terrain->count() == 0 && (rendered || threads->count() > 0))
+            throw CLI::ValidationError("evaluate", "--suite synthetic: and --threads are for --terrain");
+        if (!rendered && seeds->count() > 0)
+            throw CLI::ValidationError("evaluate", "--seeds is for --suite synthetic:");
         if (!options.matchers && (conditions->count() > 0 || disparities->count() > 0))
             throw CLI::ValidationError("evaluate", "--conditions and --disparities are for --matchers");
     });

@@ -11,6 +11,7 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "cli/truth_labels.hpp"
 #include "core/arena.hpp"
 #include "core/deterministic_math.hpp"
 #include "core/error.hpp"
@@ -64,21 +65,6 @@ std::map<std::int64_t, FrameLine> read_lines(const fs::path& path) {
     return lines;
 }
 
-std::vector<GroundPose> true_poses(const io::Truth& truth, const fs::path& folder) {
-    std::vector<GroundPose> poses;
-    if (truth.json_text().empty()) return poses;
-    try {
-        const json root = json::parse(truth.json_text());
-        if (!root.contains("frames")) return poses;
-        for (const json& frame : root.at("frames"))
-            poses.push_back(pose_from(frame));
-    } catch (const json::exception& problem) {
-        throw Refusal(ExitStatus::kInput,
-                      fmt::format("cannot use '{}': {}", (folder / "truth.json").string(), problem.what()));
-    }
-    return poses;
-}
-
 // What the run itself used; nothing where it does not say or had no calibration.
 std::optional<RectifiedRig> rig_of_run(const fs::path& path, int width, int height) {
     std::ifstream file(path);
@@ -126,7 +112,7 @@ std::vector<TerrainClass> mask_of(const io::Image8& image) {
 class Evaluator {
   public:
     Evaluator(const fs::path& truth, const fs::path& out)
-        : truth_folder_(truth), out_(out), truth_(truth), poses_(true_poses(truth_, truth)) {
+        : truth_folder_(truth), out_(out), truth_(truth), labels_(truth_, truth) {
         std::error_code error;
         if (!fs::is_directory(out / "disparity", error) || !fs::is_directory(out / "mask", error) ||
             !fs::is_regular_file(out / "frames.jsonl", error))
@@ -201,22 +187,9 @@ class Evaluator {
 
     void disparity_scores(const io::TruthFrame& truth, const io::Image16& disparity) {
         const DisparityQ8 wanted = truth.disparity_q8.view();
-        ConstLuma occluded;
-        std::vector<std::uint8_t> own;
-        const auto known = wanted.width * static_cast<std::int64_t>(wanted.height) -
-                           std::count(truth.disparity_q8.pixels.begin(), truth.disparity_q8.pixels.end(), 0);
-        report_.occlusion = "none";
-        if (truth.occluded.width > 0) {
-            occluded = truth.occluded.luma();
-            report_.occlusion = "occluded/";
-        } else if (2 * known > wanted.width * static_cast<std::int64_t>(wanted.height)) {
-            own.resize(truth.disparity_q8.pixels.size());
-            const Luma view(own.data(), wanted.width, wanted.height, wanted.width);
-            mark_occluded(wanted, view);
-            occluded = view;
-            report_.occlusion = "disparity truth";
-        }
-        score_disparity(wanted, disparity.view(), occluded, report_.disparity);
+        const OcclusionTruth occlusion(truth);
+        report_.occlusion = occlusion.origin();
+        score_disparity(wanted, disparity.view(), occlusion.view(), report_.disparity);
     }
 
     void terrain_scores(const io::TruthFrame& truth, const io::Image8& mask_image, int position,
@@ -224,34 +197,11 @@ class Evaluator {
         const DisparityQ8 wanted = truth.disparity_q8.view();
         std::vector<TerrainClass> label_pixels(truth.disparity_q8.pixels.size(), TerrainClass::kUnknown);
         const Mask labels(label_pixels.data(), wanted.width, wanted.height, wanted.width);
-        std::optional<GroundPose> pose;
-        if (position < static_cast<int>(poses_.size())) {
-            pose = poses_[static_cast<std::size_t>(position)];
-            report_.pose_truth = "truth.json";
-        }
-        if (truth_.has_classes() || truth_.has_heights()) {
-            if (truth_.has_classes()) {
-                label_by_class(truth.classes.luma(), truth.height_mm.view(), labels);
-                report_.terrain_truth = truth_.has_heights() ? "class/ and height/" : "class/";
-            } else {
-                label_by_height(truth.height_mm.view(), labels);
-                report_.terrain_truth = "height/";
-            }
-            if (rig_->calibrated) limit_range(wanted, *rig_, labels);
-        } else if (rig_->calibrated) {
-            const std::optional<DisparityPlane> plane = fit_ground(wanted, *rig_);
-            if (plane) {
-                label_by_disparity(wanted, *plane, *rig_, labels);
-                report_.terrain_truth = "disparity truth";
-                if (!pose && poses_.empty()) {
-                    pose = pose_of(*plane, *rig_);
-                    report_.pose_truth = "disparity truth";
-                }
-            } else {
-                ++groundless_;
-            }
-        }
-        if (pose && line.pose) score_pose(*line.pose, *pose, report_.pose);
+        const TruthLabels::Origin origin = labels_.label(truth, position, *rig_, labels);
+        if (!origin.terrain.empty()) report_.terrain_truth = origin.terrain;
+        if (!origin.pose.empty()) report_.pose_truth = origin.pose;
+        groundless_ += origin.groundless ? 1 : 0;
+        if (origin.true_pose && line.pose) score_pose(*line.pose, *origin.true_pose, report_.pose);
         std::vector<TerrainClass> mask = mask_of(mask_image);
         score_terrain(labels, Mask(mask.data(), wanted.width, wanted.height, wanted.width), report_.terrain);
     }
@@ -276,7 +226,7 @@ class Evaluator {
     fs::path truth_folder_;
     fs::path out_;
     io::Truth truth_;
-    std::vector<GroundPose> poses_;  // empty: unknown
+    TruthLabels labels_;
     std::map<std::int64_t, FrameLine> lines_;
     std::optional<RectifiedRig> rig_;  // set with the first frame
     std::int64_t groundless_ = 0;

@@ -1,7 +1,6 @@
 #include "cli/matcher_table.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -16,6 +15,8 @@
 #include "cli/compared_matchers.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/perturbation.hpp"
+#include "cli/step_progress.hpp"
+#include "cli/truth_labels.hpp"
 #include "cli/truth_sets.hpp"
 #include "core/arena.hpp"
 #include "core/error.hpp"
@@ -119,7 +120,7 @@ class SetRun {
         for (const MatcherChoice& choice : job.matchers)
             matchers_.push_back(choice.make(size, serial_));
         frame_ = StereoFrame::make(arena_, info.width, info.height, info.colour);
-        for (Luma* image : {&left_, &right_, &spare_left_, &spare_right_, &own_occluded_})
+        for (Luma* image : {&left_, &right_, &spare_left_, &spare_right_})
             *image = arena_.image<std::uint8_t>(info.width, info.height);
         answers_ = arena_.image<std::uint16_t>(info.width, info.height);
         scores_.scores.resize(job.conditions.size() * job.matchers.size());
@@ -170,22 +171,11 @@ class SetRun {
             return;
         }
         rectifier_->rectify(frame_, left_, right_, {}, serial_);
-        score(wanted, occlusion(truth), position);
+        const OcclusionTruth occlusion(truth);
+        pixels_ += static_cast<std::int64_t>(truth.disparity_q8.pixels.size());
+        known_ += occlusion.known();
+        score(wanted, occlusion.view(), position);
         ++scores_.frames;
-    }
-
-    // As for a replay's results: told by the truth's folder, or else by a dense truth itself.
-    ConstLuma occlusion(const io::TruthFrame& truth) {
-        const DisparityQ8 wanted = truth.disparity_q8.view();
-        const auto pixels = static_cast<std::int64_t>(truth.disparity_q8.pixels.size());
-        const std::int64_t known =
-            pixels - std::count(truth.disparity_q8.pixels.begin(), truth.disparity_q8.pixels.end(), 0);
-        pixels_ += pixels;
-        known_ += known;
-        if (truth.occluded.width > 0) return truth.occluded.luma();
-        if (2 * known <= pixels) return {};
-        mark_occluded(wanted, own_occluded_);
-        return own_occluded_;
     }
 
     void score(DisparityQ8 wanted, ConstLuma occluded, int position) {
@@ -215,7 +205,7 @@ class SetRun {
     std::unique_ptr<rig::Rectifier> rectifier_;
     std::vector<std::unique_ptr<ComparedMatcher>> matchers_;
     StereoFrame frame_;
-    Luma left_, right_, spare_left_, spare_right_, own_occluded_;
+    Luma left_, right_, spare_left_, spare_right_;
     ImageView<std::uint16_t> answers_;
     std::int64_t pixels_ = 0;
     std::int64_t known_ = 0;
@@ -418,16 +408,6 @@ ordered_json table_json(const MatcherTableOptions& options, const Job& job,
     return root;
 }
 
-// Says on a terminal how far the run is.
-void show_progress(std::size_t done, std::size_t all, const std::string& set) {
-    if (::isatty(STDERR_FILENO) == 0) return;
-    if (done < all)
-        fmt::print(stderr, "\r\x1b[K{} of {}: {}", done + 1, all, set);
-    else
-        fmt::print(stderr, "\r\x1b[K");
-    std::fflush(stderr);
-}
-
 }  // namespace
 
 std::uint64_t pair_number(std::string_view set, std::int64_t frame) {
@@ -472,7 +452,7 @@ int run_matcher_table(const MatcherTableOptions& options) {
     std::vector<SetScores> sets;
     int status = 0;
     for (const fs::path& folder : folders) {
-        show_progress(sets.size(), folders.size(), folder.filename().string());
+        show_step(sets.size(), folders.size(), folder.filename().string());
         try {
             sets.push_back(scores_of(job, folder));
         } catch (const Interrupted&) {
@@ -481,7 +461,7 @@ int run_matcher_table(const MatcherTableOptions& options) {
         }
         if (status == 0) status = sets.back().status;
     }
-    show_progress(folders.size(), folders.size(), {});
+    show_step(folders.size(), folders.size(), {});
     const std::vector<MatcherGroup> groups = grouped(sets);
     if (options.json)
         fmt::print("{}\n", table_json(options, job, sets, groups).dump(2));

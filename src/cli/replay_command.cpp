@@ -12,13 +12,13 @@
 #include "cli/interrupt.hpp"
 #include "cli/progress.hpp"
 #include "cli/run_report.hpp"
+#include "cli/run_setup.hpp"
 #include "core/clock.hpp"
 #include "core/error.hpp"
 #include "io/calibration/calibration_reader.hpp"
 #include "io/result_writer.hpp"
 #include "pipeline/worker_pool.hpp"
 #include "publish/lcm_publisher.hpp"
-#include "rig/range.hpp"
 
 namespace groundline::cli {
 namespace {
@@ -46,32 +46,6 @@ pipeline::RunOptions run_options(const ReplayOptions& options) {
     return run;
 }
 
-settings::Settings load_settings(const ReplayOptions& options) {
-    settings::Settings settings;
-    if (!options.config.empty()) settings::load_file(settings, options.config);
-    for (const std::string& word : options.set)
-        settings::set_word(settings, word);
-    if (options.lcm) settings.publish.url = options.lcm_url;
-    return settings;
-}
-
-rig::StereoCalibration calibration_of(const RectifiedRig& rig) {
-    rig::StereoCalibration calibration;
-    calibration.rectified = true;
-    for (rig::CameraModel* camera : {&calibration.left, &calibration.right}) {
-        camera->width = rig.width;
-        camera->height = rig.height;
-        camera->fx = camera->fy = rig.focal_px;
-        camera->cy = rig.cy_px;
-    }
-    calibration.left.cx = rig.cx_px;
-    calibration.right.cx = rig.cx_right_px;
-    calibration.translation_m = {-rig.baseline_m, 0.0, 0.0};
-    calibration.source = "the scene";
-    calibration.format = "rendered";
-    return calibration;
-}
-
 std::optional<rig::StereoCalibration> load_calibration(const ReplayOptions& options,
                                                        const capture::OpenedSource& opened) {
     const SourceInfo& info = opened.source->info();
@@ -80,15 +54,6 @@ std::optional<rig::StereoCalibration> load_calibration(const ReplayOptions& opti
     if (files.empty() && !opened.folder.empty()) files = io::find_calibration(opened.folder);
     if (files.empty()) return std::nullopt;
     return io::read_calibration(files, info.width, info.height, opened.colour_pair);
-}
-
-pipeline::ProcessorConfig processor_config(const settings::Settings& settings, bool colour) {
-    pipeline::ProcessorConfig config;
-    config.matcher = settings.matcher;
-    config.terrain = settings::terrain_config(settings);
-    config.limits = settings::verdict_limits(settings);
-    config.colour = colour;
-    return config;
 }
 
 publish::LcmOptions lcm_options(const settings::PublishSettings& settings, Counters& counters) {
@@ -125,14 +90,13 @@ int run_replay(const ReplayOptions& options) {
         throw Refusal(ExitStatus::kUsage,
                       "--loop with --out would write the same files for ever: leave one of them out");
     const pipeline::RunOptions run = run_options(options);
-    settings::Settings settings = load_settings(options);
+    settings::Settings settings = load_settings(options.config, options.set);
+    if (options.lcm) settings.publish.url = options.lcm_url;
     capture::OpenedSource opened = capture::open_source(options.source);
     FrameSource& source = *opened.source;
     const SourceInfo& info = source.info();
     const std::optional<rig::StereoCalibration> calibration = load_calibration(options, opened);
-    if (settings.auto_disparities)
-        settings.matcher.disparities =
-            rig::auto_disparities(info.width, calibration ? calibration->disparities_hint : 0);
+    choose_disparities(info.width, calibration ? calibration->disparities_hint : 0, settings);
 
     // Everything that can be refused is set up before anything is written or printed.
     Arena arena;

@@ -1,0 +1,45 @@
+#include "cli/run_setup.hpp"
+
+#include "rig/range.hpp"
+
+namespace groundline::cli {
+
+settings::Settings load_settings(const std::filesystem::path& file, const std::vector<std::string>& words) {
+    settings::Settings settings;
+    if (!file.empty()) settings::load_file(settings, file);
+    for (const std::string& word : words)
+        settings::set_word(settings, word);
+    return settings;
+}
+
+rig::StereoCalibration calibration_of(const RectifiedRig& rig) {
+    rig::StereoCalibration calibration;
+    calibration.rectified = true;
+    for (rig::CameraModel* camera : {&calibration.left, &calibration.right}) {
+        camera->width = rig.width;
+        camera->height = rig.height;
+        camera->fx = camera->fy = rig.focal_px;
+        camera->cy = rig.cy_px;
+    }
+    calibration.left.cx = rig.cx_px;
+    calibration.right.cx = rig.cx_right_px;
+    calibration.translation_m = {-rig.baseline_m, 0.0, 0.0};
+    calibration.source = "the scene";
+    calibration.format = "rendered";
+    return calibration;
+}
+
+void choose_disparities(int width, int hint, settings::Settings& settings) {
+    if (settings.auto_disparities) settings.matcher.disparities = rig::auto_disparities(width, hint);
+}
+
+pipeline::ProcessorConfig processor_config(const settings::Settings& settings, bool colour) {
+    pipeline::ProcessorConfig config;
+    config.matcher = settings.matcher;
+    config.terrain = settings::terrain_config(settings);
+    config.limits = settings::verdict_limits(settings);
+    config.colour = colour;
+    return config;
+}
+
+}  // namespace groundline::cli
