@@ -3,6 +3,8 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
+#include <span>
 #include <string_view>
 
 #include "core/arena.hpp"
@@ -55,6 +57,38 @@ struct Sector {
 };
 inline constexpr std::size_t kMaxSectors = 64;
 
+// One square of ground. Heights are above the ground found; NaN is not measured.
+struct GridCell {
+    static constexpr float kNotMeasured = std::numeric_limits<float>::quiet_NaN();
+
+    TerrainClass kind = TerrainClass::kUnknown;
+    std::int32_t points = 0;  // that made the class
+    float elevation_m = kNotMeasured;
+    float highest_m = kNotMeasured;
+    float slope_rad = kNotMeasured;
+    float roughness_m = kNotMeasured;
+    float step_m = kNotMeasured;
+    float index = kNotMeasured;  // of traversability, 0 (no) to 1
+};
+
+// The ground about the robot in the body frame (x forward, y left): cell (i, j) covers x in [x_m + i cell_m,
+// x_m + (i + 1) cell_m), y in [y_m + j cell_m, y_m + (j + 1) cell_m). Row-major; empty where nobody asked.
+struct TerrainGrid {
+    std::span<GridCell> cells;
+    int rows = 0;
+    int columns = 0;
+    double cell_m = 0.0;
+    double x_m = 0.0;
+    double y_m = 0.0;
+
+    GridCell& at(int row, int column) const {
+        return cells[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
+                     static_cast<std::size_t>(column)];
+    }
+};
+// What one datagram holds, at ten bytes a cell.
+inline constexpr std::size_t kMaxGridCells = 6500;
+
 enum class Stage : std::uint8_t { kRead, kRectify, kMatch, kGround, kClassify, kWrite, kPublish, kCount };
 inline constexpr std::array<std::string_view, static_cast<std::size_t>(Stage::kCount)> kStageNames = {
     "read", "rectify", "match", "ground", "classify", "write", "publish"};
@@ -81,6 +115,7 @@ struct FrameResult {
     double range_limit_m = 0.0;                   // farthest range at which a pixel may be traversable
     FixedVector<Obstacle, kMaxObstacles> obstacles;
     FixedVector<Sector, kMaxSectors> sectors;
+    TerrainGrid grid;
     StageTimes times_ns{};
 };
 
