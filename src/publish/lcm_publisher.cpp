@@ -37,6 +37,7 @@ struct LcmPublisher::Parts {
           health_channel(from.prefix + "_HEALTH"),
           v_disparity_channel(from.prefix + std::string(kLongestSuffix)),
           preview_channel(from.prefix + "_PREVIEW"),
+          grid_channel(from.prefix + "_GRID"),
           link(resolve_url(from.url)),
           tracker(from.counters, from.stale_after_ns) {}
 
@@ -75,6 +76,7 @@ struct LcmPublisher::Parts {
     std::string health_channel;
     std::string v_disparity_channel;
     std::string preview_channel;
+    std::string grid_channel;
     LcmLink link;
     HealthTracker tracker;
     MessageEncoder encoder;
@@ -98,6 +100,7 @@ bool LcmPublisher::consume(const FrameResult& result) {
     if (channels.ground) good &= parts.send(parts.ground_channel, encoder.ground(result));
     if (channels.v_disparity) good &= parts.send(parts.v_disparity_channel, encoder.v_disparity(result));
     if (channels.preview) good &= parts.send(parts.preview_channel, encoder.preview(result));
+    if (channels.grid) good &= parts.send(parts.grid_channel, encoder.grid(result));
     const std::int64_t end_ns = parts.now();
     parts.tracker.note(result, end_ns - start_ns, end_ns);
     if (parts.health_due()) good &= parts.send_health();

@@ -20,6 +20,7 @@ struct Channels {
     bool health = true;
     bool v_disparity = false;
     bool preview = false;
+    bool grid = false;
 };
 
 struct LcmOptions {

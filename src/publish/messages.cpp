@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "groundline/grid_t.hpp"
 #include "groundline/ground_t.hpp"
 #include "groundline/health_t.hpp"
 #include "groundline/image_t.hpp"
@@ -71,6 +72,13 @@ static_assert(kReasons == 25);
 
 // Bytes of data that leave room for the other fields of vdisparity_t and image_t.
 constexpr std::size_t kMaxDataBytes = kMaxMaskBytes;
+// Counts of grid_t: heights to 32.7 m, slopes to a right angle, roughness to 0.5 m, steps to 1.27 m.
+constexpr double kElevationScaleM = 0.001;
+constexpr double kSlopeScaleRad = 1.0 / 160.0;
+constexpr double kRoughnessScaleM = 0.002;
+constexpr double kStepScaleM = 0.005;
+constexpr double kIndexScale = 1.0 / 250.0;
+static_assert(10 * kMaxGridCells + 200 <= kMaxMessageBytes);
 constexpr std::size_t kHealthCounters = static_cast<std::size_t>(Count::kCount) + 1;
 constexpr std::size_t kHealthLatencies = static_cast<std::size_t>(Stage::kCount) + 1;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
@@ -108,6 +116,16 @@ constexpr int parts_of(int length, int step) {
     return (length + step - 1) / step;
 }
 
+std::uint8_t counts8(double value, double scale) {
+    if (!(value == value)) return grid_t::NOT_MEASURED;
+    return static_cast<std::uint8_t>(std::clamp(value / scale + 0.5, 0.0, grid_t::NOT_MEASURED - 1.0));
+}
+std::int16_t counts16(double value, double scale) {
+    if (!(value == value)) return grid_t::NO_ELEVATION;
+    const double count = std::clamp(value / scale, -32767.0, 32767.0);
+    return static_cast<std::int16_t>(count < 0.0 ? count - 0.5 : count + 0.5);
+}
+
 // Red, green and blue of a cell: grey half mixed with the colour of its class.
 std::array<std::uint8_t, 3> tinted(unsigned grey, TerrainClass kind) {
     const auto dim = static_cast<std::uint8_t>(grey / 2);
@@ -134,6 +152,7 @@ struct MessageEncoder::Parts {
     sectors_t sectors;
     ground_t ground;
     vdisparity_t v_disparity;
+    grid_t grid;
     image_t preview;
     health_t health;
 
@@ -144,6 +163,11 @@ struct MessageEncoder::Parts {
         preview.data.resize(kMaxDataBytes);
         preview.nmetadata = 0;
         sectors.sectors.resize(kMaxSectors);
+        for (std::vector<std::uint8_t>* bytes :
+             {&grid.kind, &grid.index, &grid.slope, &grid.roughness, &grid.step, &grid.points})
+            bytes->resize(kMaxGridCells);
+        grid.elevation.resize(kMaxGridCells);
+        grid.highest.resize(kMaxGridCells);
         health.latencies.resize(kHealthLatencies);
         health.counters.resize(kHealthCounters);
         for (std::size_t stage = 0; stage < kStageNames.size(); ++stage)
@@ -337,6 +361,37 @@ MessageEncoder::Bytes MessageEncoder::preview(const FrameResult& result) {
             const auto pixels = static_cast<unsigned>((bottom - top) * (last - first));
             to = std::ranges::copy(tinted((sum + pixels / 2) / pixels, gravest), to).out;
         }
+    }
+    return parts_->encode(out);
+}
+
+MessageEncoder::Bytes MessageEncoder::grid(const FrameResult& result) {
+    const TerrainGrid& from = result.grid;
+    if (from.cells.empty() || from.cells.size() > kMaxGridCells) return {};
+    grid_t& out = parts_->grid;
+    set_head(out, result);
+    out.rows = from.rows;
+    out.columns = from.columns;
+    out.cell_m = wire(from.cell_m);
+    out.x_m = wire(from.x_m);
+    out.y_m = wire(from.y_m);
+    out.elevation_scale_m = kElevationScaleM;
+    out.slope_scale_rad = kSlopeScaleRad;
+    out.roughness_scale_m = kRoughnessScaleM;
+    out.step_scale_m = kStepScaleM;
+    out.index_scale = kIndexScale;
+    out.cells = static_cast<std::int32_t>(from.cells.size());
+    const bool blind = result.verdict == Verdict::kBlind;
+    for (std::size_t k = 0; k < from.cells.size(); ++k) {
+        const GridCell cell = blind ? GridCell{} : from.cells[k];
+        out.kind[k] = static_cast<std::uint8_t>(cell.kind);
+        out.index[k] = counts8(cell.index, kIndexScale);
+        out.elevation[k] = counts16(cell.elevation_m, kElevationScaleM);
+        out.highest[k] = counts16(cell.highest_m, kElevationScaleM);
+        out.slope[k] = counts8(cell.slope_rad, kSlopeScaleRad);
+        out.roughness[k] = counts8(cell.roughness_m, kRoughnessScaleM);
+        out.step[k] = counts8(cell.step_m, kStepScaleM);
+        out.points[k] = static_cast<std::uint8_t>(std::clamp(cell.points, 0, 255));
     }
     return parts_->encode(out);
 }

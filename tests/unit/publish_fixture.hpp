@@ -1,6 +1,7 @@
 // A frame result whose every field differs from its default, for the tests of publishing.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 #include "core/arena.hpp"
@@ -63,6 +64,20 @@ struct Frame {
         result.range_limit_m = 11.5;
         result.sectors.push_back({0.25, 0.5, true, TerrainClass::kDrop, 3.5, 0.125, 2.5, 0.75});
         result.sectors.push_back({-0.25, 0.5, false, TerrainClass::kUnknown, 0.0, 0.0, 6.5, 1.0});
+        result.grid.cells = arena.take<GridCell>(6);
+        result.grid.rows = 2;
+        result.grid.columns = 3;
+        result.grid.cell_m = 0.25;
+        result.grid.x_m = 0.5;
+        result.grid.y_m = -0.375;
+        std::fill(result.grid.cells.begin(), result.grid.cells.end(), GridCell{});
+        result.grid.at(0, 1) = {
+            TerrainClass::kTraversable, 17, 0.0131F, 0.0299F, 0.0312F, 0.0081F, 0.0249F, 0.5F};
+        result.grid.at(1, 0) = {TerrainClass::kObstacle, 300,  0.75F, 40.0F, GridCell::kNotMeasured,
+                                GridCell::kNotMeasured,  9.0F, 0.0F};
+        result.grid.at(1, 2).kind = TerrainClass::kDrop;
+        result.grid.at(1, 2).elevation_m = -0.3126F;
+        result.grid.at(1, 2).index = 0.0F;
         result.times_ns = {1'000'000, 2'000'000, 3'000'000, 4'000'000, 5'000'000, 0, 0};
     }
 };

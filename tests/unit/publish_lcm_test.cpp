@@ -116,7 +116,8 @@ TEST(Lcm, ChannelsAndPrefix) {
                         .ground = false,
                         .health = false,
                         .v_disparity = true,
-                        .preview = true};
+                        .preview = true,
+                        .grid = true};
     LcmPublisher publisher(options);
     const Frame frame(64, 48);
     ASSERT_TRUE(publisher.consume(frame.result));
@@ -128,8 +129,9 @@ TEST(Lcm, ChannelsAndPrefix) {
     fake_now_ns += 1000 * kMs;
     ASSERT_TRUE(publisher.tick());
     drain(publisher.handle());
-    ASSERT_EQ(inbox.size(), 3U);
-    for (const char* channel : {"ROBOT7_EYES_MASK", "ROBOT7_EYES_VDISPARITY", "ROBOT7_EYES_PREVIEW"})
+    ASSERT_EQ(inbox.size(), 4U);
+    for (const char* channel :
+         {"ROBOT7_EYES_MASK", "ROBOT7_EYES_VDISPARITY", "ROBOT7_EYES_PREVIEW", "ROBOT7_EYES_GRID"})
         EXPECT_EQ(inbox[channel].size(), 1U) << channel;
 }
 

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "groundline/grid_t.hpp"
 #include "groundline/ground_t.hpp"
 #include "groundline/health_t.hpp"
 #include "groundline/image_t.hpp"
@@ -36,6 +37,11 @@ class Golden {
   public:
     Golden& i64(std::int64_t value) { return number(static_cast<std::uint64_t>(value), 8); }
     Golden& i32(std::int64_t value) { return number(static_cast<std::uint64_t>(value), 4); }
+    Golden& i16(std::initializer_list<int> values) {
+        for (const int value : values)
+            number(static_cast<std::uint64_t>(value), 2);
+        return *this;
+    }
     Golden& i8(int value) { return number(static_cast<std::uint64_t>(value), 1); }
     Golden& fingerprint(std::uint64_t value) { return number(value, 8); }
     Golden& real(double value) { return number(std::bit_cast<std::uint64_t>(value), 8); }
@@ -86,6 +92,7 @@ TEST(Messages, FingerprintsAreThoseThatOthersCompiledAgainst) {
     EXPECT_EQ(static_cast<std::uint64_t>(ground_t::getHash()), 0xece73ec4bb2bb165U);
     EXPECT_EQ(static_cast<std::uint64_t>(health_t::getHash()), 0xf0f9c8b8bfa1a48cU);
     EXPECT_EQ(static_cast<std::uint64_t>(vdisparity_t::getHash()), 0xc372905163392668U);
+    EXPECT_EQ(static_cast<std::uint64_t>(grid_t::getHash()), 0xe719f93181ce58e1U);
     // bot_core.image_t: members 0x6fee6cb20472ff6a plus its image_metadata_t, rotated by one.
     EXPECT_EQ(static_cast<std::uint64_t>(image_t::getHash()), 0x14739ffe13d5f5f0U);
 }
@@ -170,6 +177,61 @@ TEST(Messages, PreviewBytes) {
     golden.i32(2).i32(2).i32(6).i32(859981650).i32(12);
     golden.raw({100, 100, 100, 101, 101, 101, 50, 177, 50, 178, 50, 50}).i32(0);
     EXPECT_EQ(copy(encoder.preview(frame.result)), golden.bytes);
+}
+
+TEST(Messages, GridBytes) {
+    const Frame frame(8, 4);
+    MessageEncoder encoder;
+    Golden golden;
+    golden.fingerprint(0xe719f93181ce58e1).head(2, 0x4).i32(2).i32(3);
+    golden.reals({0.25, 0.5, -0.375}).reals({0.001, 0.00625, 0.002, 0.005, 0.004}).i32(6);
+    golden.raw({0, 1, 0, 2, 0, 3}).raw({255, 125, 255, 0, 255, 0});              // kind, index
+    golden.i16({-32768, 13, -32768, 750, -32768, -313});                         // elevation
+    golden.i16({-32768, 30, -32768, 32767, -32768, -32768});                     // highest
+    golden.raw({255, 5, 255, 255, 255, 255}).raw({255, 4, 255, 255, 255, 255});  // slope, roughness
+    golden.raw({255, 5, 255, 254, 255, 255}).raw({0, 17, 0, 255, 0, 0});         // step, points
+    EXPECT_EQ(copy(encoder.grid(frame.result)), golden.bytes);
+}
+
+// The largest grid there may be, full of what takes most: arrays whose length is fixed by the cells alone.
+TEST(Messages, TheLargestGridFitsADatagramAndComesBack) {
+    Frame frame(8, 4);
+    TerrainGrid& grid = frame.result.grid;
+    grid.rows = 65;
+    grid.columns = 100;
+    grid.cells = frame.arena.take<GridCell>(kMaxGridCells);
+    for (std::size_t k = 0; k < grid.cells.size(); ++k) {
+        const auto part = static_cast<float>(k) / static_cast<float>(grid.cells.size());
+        grid.cells[k] = {static_cast<TerrainClass>(k % 4),
+                         static_cast<std::int32_t>(k),
+                         4.0F * part - 2.0F,
+                         3.0F * part,
+                         1.5F * part,
+                         0.5F * part,
+                         part,
+                         1.0F - part};
+    }
+    MessageEncoder encoder;
+    const MessageEncoder::Bytes bytes = encoder.grid(frame.result);
+    EXPECT_GT(bytes.size(), 65'000U);
+    EXPECT_LE(bytes.size() + 63 + 1, 65499U);
+    const auto message = read<grid_t>(bytes);
+    ASSERT_EQ(message.cells, 6500);
+    ASSERT_EQ(message.rows * message.columns, message.cells);
+    for (std::size_t k = 0; k < grid.cells.size(); ++k) {
+        const GridCell& cell = grid.cells[k];
+        ASSERT_EQ(message.kind[k], static_cast<int>(cell.kind));
+        ASSERT_NEAR(message.index[k] * message.index_scale, cell.index, 0.501 * message.index_scale);
+        ASSERT_NEAR(message.elevation[k] * message.elevation_scale_m, cell.elevation_m, 0.000501);
+        ASSERT_NEAR(message.highest[k] * message.elevation_scale_m, cell.highest_m, 0.000501);
+        ASSERT_NEAR(message.slope[k] * message.slope_scale_rad, cell.slope_rad,
+                    0.501 * message.slope_scale_rad);
+        ASSERT_NEAR(message.roughness[k] * message.roughness_scale_m, cell.roughness_m,
+                    0.501 * message.roughness_scale_m);
+        ASSERT_NEAR(message.step[k] * message.step_scale_m, cell.step_m, 0.501 * message.step_scale_m);
+    }
+    frame.result.grid = {};
+    EXPECT_TRUE(encoder.grid(frame.result).empty());
 }
 
 HealthReport full_report() {
@@ -294,6 +356,16 @@ TEST(Messages, BlindShowsNothingWhateverTheResultHolds) {
 
     const auto v_disparity = read<vdisparity_t>(encoder.v_disparity(frame.result));
     EXPECT_TRUE(std::isnan(v_disparity.line_slope));
+    const auto grid = read<grid_t>(encoder.grid(frame.result));
+    ASSERT_EQ(grid.cells, 6);
+    for (std::size_t k = 0; k < 6; ++k) {
+        EXPECT_EQ(grid.kind[k], mask_t::CLASS_UNKNOWN);
+        EXPECT_EQ(grid.elevation[k], grid_t::NO_ELEVATION);
+        EXPECT_EQ(grid.highest[k], grid_t::NO_ELEVATION);
+        EXPECT_EQ(grid.points[k], 0);
+        for (const auto* bytes : {&grid.index, &grid.slope, &grid.roughness, &grid.step})
+            EXPECT_EQ((*bytes)[k], grid_t::NOT_MEASURED);
+    }
     const auto preview = read<image_t>(encoder.preview(frame.result));
     for (std::size_t i = 0; i < preview.data.size(); i += 3)
         ASSERT_TRUE(preview.data[i] == preview.data[i + 1] && preview.data[i] == preview.data[i + 2]);
@@ -378,6 +450,7 @@ TEST(Messages, EncodingAllocatesNothing) {
         bytes += encoder.ground(each->result).size();
         bytes += encoder.v_disparity(each->result).size();
         bytes += encoder.preview(each->result).size();
+        bytes += encoder.grid(each->result).size();
         bytes += encoder.health(report).size();
         bytes += encoder.sectors_without_frames(1, 2).size();
     }
