@@ -24,12 +24,13 @@ enum class Invalid : std::uint8_t {
     kCost,        // even the best match is bad
     kSpeckle,     // part of a patch too small to believe
     kRangeEdge,   // best at the last disparity: nearer than the search range
+    kBody,        // a part of the robot itself
     kCount,
 };
 
 inline constexpr std::array<std::string_view, static_cast<std::size_t>(Invalid::kCount)> kInvalidNames = {
-    "valid",      "border",     "no_image", "texture", "uniqueness",
-    "left_right", "saturation", "cost",     "speckle", "range_edge"};
+    "valid",      "border", "no_image", "texture",    "uniqueness", "left_right",
+    "saturation", "cost",   "speckle",  "range_edge", "body"};
 
 // Disparity of the left view: left(x, y) matches right(x - d, y), measured u_L - u_R, in 1/16 px.
 // A pixel holds iff its reason is kNone; disparity_q4 is 0 elsewhere, and 0 is a valid disparity too.

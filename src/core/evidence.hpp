@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <string_view>
 
+#include "core/attitude.hpp"
 #include "core/ground.hpp"
 
 namespace groundline {
@@ -44,15 +45,16 @@ enum class Reason : std::uint8_t {
     kBlurred,         // one camera is out of focus or dirty
     kOverload,        // frames were skipped or shrunk to keep up
     kUnchecked,       // disparities are answered without checks
+    kIdentical,       // left and right are one and the same picture
     kCount,
 };
 inline constexpr int kReasons = static_cast<int>(Reason::kCount);
 inline constexpr std::array<std::string_view, static_cast<std::size_t>(kReasons)> kReasonNames = {
-    "no_frames",      "uncalibrated", "no_mount_prior", "low_density", "few_inliers",
-    "short_line",     "outside_gate", "pose_jump",      "ambiguous",   "uneven",
-    "uncertain_pose", "blocked_view", "wall",           "no_ground",   "held_ground",
-    "photometric",    "overexposed",  "dark",           "frozen",      "swapped",
-    "unsynchronised", "epipolar",     "blurred",        "overload",    "unchecked"};
+    "no_frames",    "uncalibrated", "no_mount_prior", "low_density", "few_inliers",    "short_line",
+    "outside_gate", "pose_jump",    "ambiguous",      "uneven",      "uncertain_pose", "blocked_view",
+    "wall",         "no_ground",    "held_ground",    "photometric", "overexposed",    "dark",
+    "frozen",       "swapped",      "unsynchronised", "epipolar",    "blurred",        "overload",
+    "unchecked",    "identical"};
 
 // A set of reasons, as the bit mask that goes out in messages.
 class Reasons {
@@ -74,12 +76,31 @@ static_assert(kReasons <= 32);
 
 // How the two pictures compare, before matching.
 struct PhotometricEvidence {
-    double gain = 1.0;               // left is about gain * right + offset
-    double offset = 0.0;             // grey levels
-    double mismatch = 0.0;           // mean |left - right| of matching brightness ranks, grey levels
-    double overexposed_share = 0.0;  // of pixels at 255 in either view
-    double dark_share = 0.0;         // of pixels at or below the dark level in either view
+    double gain = 1.0;      // left is about gain * right + offset
+    double offset = 0.0;    // grey levels
+    double mismatch = 0.0;  // mean |left - right| of matching brightness ranks, grey levels
+    // Of the lower half of the picture, in the worse view: a sky may be white, and trees before it black.
+    double overexposed_share = 0.0;  // pixels at 255
+    double dark_share = 0.0;         // pixels at or below the dark level
     double contrast = 0.0;           // grey levels between the 5th and the 95th percentile, the weaker view
+};
+
+// How the two pictures lie to each other, from sparse features, before matching.
+struct PairEvidence {
+    bool identical = false;      // left and right are one and the same picture, as delivered
+    int same_pairs = 1;          // pairs in a row, this one included, that are the same to the last bit
+    int patches = 0;             // with texture, tried
+    int matched = 0;             // of those, found again along the row
+    int features = 0;            // found again along the row, clearly nearer than infinity or beyond it
+    double behind_share = 0.0;   // of those, beyond infinity, where nothing can be
+    int row_features = 0;        // found again in the row too
+    double row_offset_px = 0.0;  // median vertical offset of those, right minus left
+    double row_sigma_px = 0.0;   // standard error of that median
+    // How much stronger the left view's steps of brightness are than the right view's where both see the
+    // same, its gain taken out; and the other way round. Blur of the one raises it, noise in either lowers
+    // it.
+    double left_sharper = 1.0;
+    double right_sharper = 1.0;
 };
 
 // How well the ground found explains the disparities. All shares are 0..1.
@@ -101,8 +122,10 @@ struct Evidence {
     bool mount_prior = false;
     bool checked = true;  // disparities passed validity checks; if not, every pixel counts as valid
     PhotometricEvidence photometric;
+    PairEvidence pair;
     GroundEvidence ground_fit;
     Ground ground;
+    AttitudeInput attitude;
     std::int64_t skew_ns = 0;
 };
 

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "core/arena.hpp"
+#include "core/attitude.hpp"
 #include "core/image.hpp"
 
 namespace groundline {
@@ -43,7 +44,8 @@ struct StereoFrame {
     FrameStamp stamp;
     Luma left;
     Luma right;
-    BgrView left_bgr;  // empty where the source has no colour
+    BgrView left_bgr;        // empty where the source has no colour
+    AttitudeInput attitude;  // a source that ever sets it sets it for every pair
 
     static StereoFrame make(Arena& arena, int width, int height, bool colour) {
         StereoFrame frame;

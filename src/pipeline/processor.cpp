@@ -1,6 +1,7 @@
 #include "pipeline/processor.hpp"
 
 #include <algorithm>
+#include <cassert>
 
 #include "core/clock.hpp"
 #include "rig/photometric.hpp"
@@ -24,17 +25,24 @@ class StageClock {
     std::int64_t last_ns_;
 };
 
-// What lies within `reach` px of a marked pixel, rows and columns alike; empty where nothing is marked.
-ConstImageView<std::uint8_t> widened(ConstImageView<std::uint8_t> marked, int reach, Arena& arena) {
-    if (marked.empty()) return {};
-    const auto result = arena.image<std::uint8_t>(marked.width, marked.height);
+// Writes `reason` where a marked pixel lies within `reach` px, rows and columns alike.
+void widen(ConstImageView<std::uint8_t> marked, int reach, Invalid reason, ImageView<std::uint8_t> result) {
     for (int y = 0; y < marked.height; ++y)
         for (int x = 0; x < marked.width; ++x) {
             if (marked.at(x, y) == 0) continue;
             for (int v = std::max(y - reach, 0); v <= std::min(y + reach, marked.height - 1); ++v)
                 for (int u = std::max(x - reach, 0); u <= std::min(x + reach, marked.width - 1); ++u)
-                    result.at(u, v) = 1;
+                    result.at(u, v) = static_cast<std::uint8_t>(reason);
         }
+}
+
+// The robot's own parts come last: there nothing is to be seen, matched or not.
+ConstImageView<std::uint8_t> unusable(ConstImageView<std::uint8_t> outside, ConstImageView<std::uint8_t> body,
+                                      const RectifiedRig& rig, Arena& arena) {
+    if (outside.empty() && body.empty()) return {};
+    const auto result = arena.image<std::uint8_t>(rig.width, rig.height);
+    widen(outside, stereo::kWindowReach, Invalid::kNoImage, result);
+    widen(body, stereo::kWindowReach, Invalid::kBody, result);
     return result;
 }
 
@@ -53,8 +61,13 @@ Processor::Processor(const ProcessorConfig& config, const rig::Rectifier& rectif
       sector_finder_(config.terrain, rectifier.rig(), matcher_->min_disparity(), matcher_->disparities(),
                      arena),
       right_(arena.image<std::uint8_t>(rectifier.rig().width, rectifier.rig().height)),
-      no_source_left_(widened(rectifier.outside_left(), stereo::kWindowReach, arena)),
-      no_source_right_(widened(rectifier.outside_right(), stereo::kWindowReach, arena)) {}
+      unusable_left_(unusable(rectifier.outside_left(), config.body, rectifier.rig(), arena)),
+      unusable_right_(unusable(rectifier.outside_right(), {}, rectifier.rig(), arena)),
+      pair_monitor_(rectifier.rig(), matcher_->min_disparity(), matcher_->disparities(), unusable_left_,
+                    unusable_right_, arena) {
+    assert(config.body.empty() || config.body.same_size(rectifier.rig().width, rectifier.rig().height));
+    config_.body = {};
+}
 
 FrameResult Processor::make_result(Arena& arena) const {
     const RectifiedRig& rig = rectifier_.rig();
@@ -83,11 +96,15 @@ void Processor::process(const StereoFrame& frame, FrameResult& result) {
     evidence.checked = config_.matcher.checks;
     evidence.mount_prior = config_.terrain.mount_known;
     evidence.skew_ns = frame.stamp.skew_ns;
+    evidence.attitude = frame.attitude;
     evidence.photometric = rig::measure_photometric(result.left, right_, parallel_);
+    evidence.pair = pair_monitor_.measure(result.left, right_, evidence.photometric.gain, parallel_);
+    evidence.pair.identical = rig::identical(frame.left, frame.right);
+    if (config_.live) evidence.pair.same_pairs = repeats_.count(frame.left, frame.right);
     clock.end(Stage::kRectify);
 
     matcher_->match(result.left, right_, result.disparity, parallel_);
-    mark_pixels_without_source(result.disparity);
+    mark_unusable_pixels(result.disparity);
     clock.end(Stage::kMatch);
 
     const std::int64_t now_mono_ns = frame.stamp.exposure_mono_ns;
@@ -108,22 +125,25 @@ void Processor::process(const StereoFrame& frame, FrameResult& result) {
     clock.end(Stage::kClassify);
 }
 
-// What was matched through a window that rectification could not fill is no match.
-void Processor::mark_pixels_without_source(const DisparityMap& map) {
-    const ConstImageView<std::uint8_t>& left = no_source_left_;
-    const ConstImageView<std::uint8_t>& right = no_source_right_;
+// What was matched through a window that rectification could not fill is no match; on the robot's own parts
+// it is of no interest, and neither is why it is missing.
+void Processor::mark_unusable_pixels(const DisparityMap& map) {
+    const ConstImageView<std::uint8_t>& left = unusable_left_;
+    const ConstImageView<std::uint8_t>& right = unusable_right_;
     if (left.empty() && right.empty()) return;
     for (int y = 0; y < map.height(); ++y) {
         std::int16_t* disparity = map.disparity_q4.row(y);
         Invalid* invalid = map.invalid.row(y);
         for (int x = 0; x < map.width(); ++x) {
-            if (invalid[x] != Invalid::kNone) continue;
-            const int matched = x - (disparity[x] + kDisparityOne / 2) / kDisparityOne;
-            const bool no_left = !left.empty() && left.at(x, y) != 0;
-            const bool no_right =
-                !right.empty() && matched >= 0 && matched < map.width() && right.at(matched, y) != 0;
-            if (!no_left && !no_right) continue;
-            invalid[x] = Invalid::kNoImage;
+            Invalid reason = left.empty() ? Invalid::kNone : static_cast<Invalid>(left.at(x, y));
+            if (reason != Invalid::kBody && invalid[x] != Invalid::kNone) continue;
+            if (reason == Invalid::kNone && !right.empty()) {
+                const int matched = x - (disparity[x] + kDisparityOne / 2) / kDisparityOne;
+                if (matched >= 0 && matched < map.width())
+                    reason = static_cast<Invalid>(right.at(matched, y));
+            }
+            if (reason == Invalid::kNone) continue;
+            invalid[x] = reason;
             disparity[x] = 0;
         }
     }

@@ -7,7 +7,9 @@
 #include "core/frame.hpp"
 #include "core/parallel.hpp"
 #include "core/result.hpp"
+#include "rig/pair_monitor.hpp"
 #include "rig/rectifier.hpp"
+#include "rig/repeats.hpp"
 #include "stereo/matcher.hpp"
 #include "terrain/classifier.hpp"
 #include "terrain/config.hpp"
@@ -22,6 +24,10 @@ struct ProcessorConfig {
     terrain::TerrainConfig terrain;
     verdict::Limits limits;
     bool colour = false;  // the source has colour and a sink draws it
+    bool live = false;    // pairs come from cameras, which never deliver the same picture twice
+    // Of the rectified left picture, not 0 where the robot's own parts are; empty where none are. Borrowed
+    // for the construction.
+    ConstImageView<std::uint8_t> body;
 };
 
 // Holds the state of one camera pair. Used by one thread, which lends it the lanes of `parallel`. The result
@@ -42,7 +48,7 @@ class Processor {
     const stereo::Matcher& matcher() const { return *matcher_; }
 
   private:
-    void mark_pixels_without_source(const DisparityMap& map);
+    void mark_unusable_pixels(const DisparityMap& map);
 
     ProcessorConfig config_;
     const rig::Rectifier& rectifier_;
@@ -52,9 +58,12 @@ class Processor {
     terrain::Classifier classifier_;
     terrain::SectorFinder sector_finder_;
     Luma right_;
-    // 1 where the window of a match would reach beyond the source picture; empty where none does.
-    ConstImageView<std::uint8_t> no_source_left_;
-    ConstImageView<std::uint8_t> no_source_right_;
+    // Where the window of a match would reach beyond the source picture or into the robot's own parts: the
+    // reason, an Invalid; 0 elsewhere. Empty where it nowhere does.
+    ConstImageView<std::uint8_t> unusable_left_;
+    ConstImageView<std::uint8_t> unusable_right_;
+    rig::PairMonitor pair_monitor_;
+    rig::RepeatCounter repeats_;
     verdict::State state_;
 };
 

@@ -143,10 +143,16 @@ PhotometricEvidence measure_photometric(ConstLuma left, ConstLuma right, Paralle
     });
     Histogram left_all;
     Histogram right_all;
+    Histogram left_lower;
+    Histogram right_lower;
     Matches matches;
     for (std::size_t band = 0; band < kBands; ++band) {
         left_all.add(left_bands[band]);
         right_all.add(right_bands[band]);
+        if (band >= kBands / 2) {
+            left_lower.add(left_bands[band]);
+            right_lower.add(right_bands[band]);
+        }
         if (!left_bands[band].empty() && !right_bands[band].empty())
             matches.add_band(left_bands[band], right_bands[band]);
     }
@@ -164,9 +170,10 @@ PhotometricEvidence measure_photometric(ConstLuma left, ConstLuma right, Paralle
             std::abs((line.found ? line.gain * grey + line.offset : left_all.quantile(percent)) - grey);
     }
     evidence.mismatch = difference / (kLast - kFirst + 1);
-    evidence.overexposed_share = std::max(left_all.share_within(255, 255), right_all.share_within(255, 255));
+    evidence.overexposed_share =
+        std::max(left_lower.share_within(255, 255), right_lower.share_within(255, 255));
     evidence.dark_share =
-        std::max(left_all.share_within(0, kDarkLevel), right_all.share_within(0, kDarkLevel));
+        std::max(left_lower.share_within(0, kDarkLevel), right_lower.share_within(0, kDarkLevel));
     evidence.contrast = std::min(left_all.quantile(kLast) - left_all.quantile(kFirst),
                                  right_all.quantile(kLast) - right_all.quantile(kFirst));
     return evidence;

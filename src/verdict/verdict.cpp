@@ -17,6 +17,8 @@ constexpr Reasons set_of(std::initializer_list<Reason> list) {
     return reasons;
 }
 
+// The pictures are not what two cameras see now.
+constexpr Reasons kNonsense = set_of({Reason::kFrozen, Reason::kSwapped, Reason::kIdentical});
 // What was found may be no ground at all.
 constexpr Reasons kUnusable =
     set_of({Reason::kNoGround, Reason::kWall, Reason::kOutsideGate, Reason::kPoseJump, Reason::kAmbiguous,
@@ -67,6 +69,36 @@ void judge_pictures(const Evidence& evidence, const Limits& limits, Reasons& rea
         reasons.add(Reason::kBlockedView);
 }
 
+bool sharper(double one, double other, const Limits& limits) {
+    return !at_most(one, limits.max_sharper) && !at_most(one, limits.max_sharper_ratio * other);
+}
+
+void judge_pair(const PairEvidence& pair, const Limits& limits, Reasons& reasons) {
+    if (pair.identical) reasons.add(Reason::kIdentical);
+    if (pair.same_pairs > limits.max_same_pairs) reasons.add(Reason::kFrozen);
+    if (pair.features >= limits.min_features && !at_most(pair.behind_share, limits.max_behind_share))
+        reasons.add(Reason::kSwapped);
+    if (pair.row_features < limits.min_row_features) return;
+    if (!magnitude_at_most(pair.row_offset_px, limits.max_row_offset_px + 2.0 * pair.row_sigma_px))
+        reasons.add(Reason::kEpipolar);
+    if (sharper(pair.left_sharper, pair.right_sharper, limits) ||
+        sharper(pair.right_sharper, pair.left_sharper, limits))
+        reasons.add(Reason::kBlurred);
+}
+
+// The camera turned as the ground seems to have.
+bool turned_alike(const Evidence& evidence, const State& state, const Limits& limits) {
+    const AttitudeInput& now = evidence.attitude;
+    const AttitudeInput& then = state.attitude;
+    if (!now.valid || !then.valid || !evidence.ground.metric) return false;
+    const double gap = det::radians(limits.max_attitude_gap_deg);
+    if (!at_most(now.sigma_rad, 0.5 * gap) || !at_most(then.sigma_rad, 0.5 * gap)) return false;
+    const GroundPose& pose = evidence.ground.pose;
+    const GroundPose& last = state.ground.pose;
+    return magnitude_at_most((pose.pitch_rad - last.pitch_rad) - (now.pitch_rad - then.pitch_rad), gap) &&
+           magnitude_at_most((pose.roll_rad - last.roll_rad) - (now.roll_rad - then.roll_rad), gap);
+}
+
 bool jumped(const Ground& own, const State& state, const Limits& limits) {
     if (!state.ground.metric) return false;
     if (!own.metric) return true;  // where it went cannot be said
@@ -102,7 +134,8 @@ void judge_ground(const Evidence& evidence, const State& state, bool fresh, cons
         (!own.metric || !at_most(own.sigma.pitch_rad, det::radians(limits.max_sigma_pitch_deg)) ||
          !at_most(own.sigma.height_m, limits.max_sigma_height_share * own.pose.height_m)))
         reasons.add(Reason::kUncertainPose);
-    if (fresh && jumped(own, state, limits)) reasons.add(Reason::kPoseJump);
+    if (fresh && jumped(own, state, limits) && !turned_alike(evidence, state, limits))
+        reasons.add(Reason::kPoseJump);
 }
 
 }  // namespace
@@ -116,8 +149,11 @@ Decision decide(const Evidence& evidence, const State& state, std::int64_t now_m
     if (!evidence.mount_prior) reasons.add(Reason::kNoMountPrior);
     if (!evidence.checked) reasons.add(Reason::kUnchecked);
     judge_pictures(evidence, limits, reasons);
+    judge_pair(evidence.pair, limits, reasons);
     judge_ground(evidence, state, fresh, limits, reasons);
 
+    decision.attitude = evidence.attitude;
+    if (share_any(reasons, kNonsense)) return decision;
     if (!share_any(reasons, kUnusable)) {
         const bool trusted = within(reasons, kInformative);
         decision.verdict = trusted ? Verdict::kTrusted : Verdict::kDegraded;
@@ -135,7 +171,8 @@ Decision decide(const Evidence& evidence, const State& state, std::int64_t now_m
 State next_state(const Decision& decision, const State& state, std::int64_t now_mono_ns,
                  const Limits& limits) {
     // A ground that is not the frame's own always comes with a further reason.
-    if (within(decision.reasons, kRemembered)) return {true, decision.ground, now_mono_ns, 0};
+    if (within(decision.reasons, kRemembered))
+        return {true, decision.ground, now_mono_ns, 0, decision.attitude};
     if (!is_fresh(state, now_mono_ns, limits)) return {};
     State next = state;
     ++next.frames_since;

@@ -29,6 +29,7 @@ struct Limits {
     double min_inlier_share = 0.25;       // of the valid pixels below the horizon
     double min_line_run_share = 0.25;     // of the rows below the horizon
     double max_attitude_step_deg = 2.0;   // pitch or roll, per frame since the ground last believed
+    double max_attitude_gap_deg = 3.0;    // a larger step is believed if the attitude input made it too
     double max_second_peak_ratio = 0.85;  // of the strongest Hough peak
     double max_residual_rms_px = 0.75;
     double max_row_residual_px = 1.0;
@@ -41,7 +42,22 @@ struct Limits {
     double max_overexposed_share = 0.25;              // a bright sky alone fills about a fifth
     double max_dark_share = 0.5;                      // most of the picture without anything to match
     double min_contrast = 10.0;                       // grey levels; noise of 2 levels alone spans 7
-    std::int64_t max_skew_ns = 2'000'000;             // at 30 deg/s of turn: 0.06 deg, 0.5 px at f = 500
+    // Pairs of one bit pattern in a row; the next is the third.
+    int max_same_pairs = 2;
+    // Of the features that are clearly nearer than infinity or beyond it. Not exchanged: up to 4 of 100 on 25
+    // real sets; exchanged: 58 of 100 where the principal points are 31 px apart, else 95 and more.
+    double max_behind_share = 0.35;
+    int min_features = 6;
+    // Vertical offset, by what is sure of it: two deviations of the median less. At 0.4 px a matcher of whole
+    // rows begins to miss; on KITTI's frames 0.2 are sure at most.
+    double max_row_offset_px = 0.4;
+    int min_row_features = 8;
+    // Steps of brightness of the one view over those of the other, and how much more than the other way
+    // round: sharp pairs reach 1.05 in noise; blur of sigma 2 in one view gives 1.10 (an out-of-focus pair)
+    // to 2, and ratios beyond 1.9.
+    double max_sharper = 1.08;
+    double max_sharper_ratio = 1.8;
+    std::int64_t max_skew_ns = 2'000'000;  // at 30 deg/s of turn: 0.06 deg, 0.5 px at f = 500
     // For how long an earlier ground may stand in. A robot at 1 m/s has then moved by half its stopping
     // distance.
     std::int64_t hold_ns = 1'000'000'000;
@@ -55,18 +71,22 @@ struct State {
     Ground ground;
     std::int64_t exposure_mono_ns = 0;  // of the frame that saw it
     std::int64_t frames_since = 0;      // frames decided after that one
+    AttitudeInput attitude;             // of the frame that saw it
 };
 
 struct Decision {
     Verdict verdict = Verdict::kBlind;
     Reasons reasons;
     terrain::GroundUse use = terrain::GroundUse::kNone;
-    Ground ground;  // to classify with; found is false where use is kNone
+    Ground ground;           // to classify with; found is false where use is kNone
+    AttitudeInput attitude;  // of the frame, for the memory
 };
 
 // `now_mono_ns` is the exposure of the frame that `evidence` is about, so that a replay decides as the live
-// run did. Three cases, the thresholds from Limits:
+// run did. Four cases, the thresholds from Limits:
 //
+// - kFrozen, kSwapped, kIdentical: the pictures are not what two cameras see now. Blind, whatever is
+// remembered.
 // - kNoGround, kWall, kOutsideGate, kPoseJump, kAmbiguous, kFewInliers, kShortLine: what was found may be no
 //   ground at all. The remembered one stands in while it is fresh, at most hold_ns and hold_frames old:
 //   degraded, with kHeldGround. Else blind.
@@ -75,9 +95,11 @@ struct Decision {
 //
 // Without validity checks every pixel has a disparity: density and blocked view say nothing, so kUnchecked.
 //
-// kPoseJump compares with the remembered ground while that is fresh. A stamp before the remembered one means
-// that the source began again: the memory does not count. Worse evidence never gives a better verdict or use.
-// kFrozen, kSwapped, kEpipolar, kBlurred and kOverload are never given: Evidence does not hold them.
+// kPoseJump compares with the remembered ground while that is fresh. A step beyond max_attitude_step_deg is
+// none where the attitude input changed by as much since then, within max_attitude_gap_deg: compared are
+// changes, not angles, because the ground slopes and gravity does not. A stamp before the remembered one
+// means that the source began again: the memory does not count. Worse evidence never gives a better verdict
+// or use. kOverload is never given: Evidence does not hold it.
 Decision decide(const Evidence& evidence, const State& state, std::int64_t now_mono_ns, const Limits& limits);
 
 // The state after that decision. Remembered is a ground whose only reasons are kNoMountPrior, kUncalibrated

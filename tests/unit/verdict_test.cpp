@@ -53,13 +53,17 @@ Evidence good_evidence() {
     Evidence evidence;
     evidence.calibrated = evidence.mount_prior = true;
     evidence.photometric = {1.01, 0.5, 1.0, 0.01, 0.05, 120.0};
+    evidence.pair.patches = evidence.pair.matched = evidence.pair.features = evidence.pair.row_features = 80;
+    evidence.pair.row_offset_px = 0.05;
+    evidence.pair.row_sigma_px = 0.02;
+    evidence.pair.left_sharper = evidence.pair.right_sharper = 0.95;
     evidence.ground_fit = {true, true, false, 0.8, 0.7, 0.9, 0.3, 0.25, 0.1, 0.1};
     evidence.ground = good_ground();
     return evidence;
 }
 
 State remembering(double pitch_deg, std::int64_t exposure_mono_ns, std::int64_t frames_since = 0) {
-    return {true, good_ground(pitch_deg), exposure_mono_ns, frames_since};
+    return {true, good_ground(pitch_deg), exposure_mono_ns, frames_since, {}};
 }
 
 const Limits kLimits;
@@ -97,6 +101,7 @@ struct Rule {
     GroundUse use;  // without memory: kWeak (degraded) or kNone (blind)
     std::function<void(Evidence&)> at_limit;
     std::function<void(Evidence&)> beyond;
+    bool hopeless = false;  // blind whatever is remembered
 };
 
 double above(double value) {
@@ -175,6 +180,39 @@ const std::vector<Rule>& rules() {
          [](E& e) { e.skew_ns = -2 * kMs - 1; }},
         {"skew of no sense", Reason::kUnsynchronised, GroundUse::kWeak, [](E&) {},
          [](E& e) { e.skew_ns = std::numeric_limits<std::int64_t>::min(); }},
+        {"frozen", Reason::kFrozen, GroundUse::kNone, [](E& e) { e.pair.same_pairs = 2; },
+         [](E& e) { e.pair.same_pairs = 3; }, true},
+        {"identical", Reason::kIdentical, GroundUse::kNone, [](E&) {}, [](E& e) { e.pair.identical = true; },
+         true},
+        {"swapped", Reason::kSwapped, GroundUse::kNone, [](E& e) { e.pair.behind_share = 0.35; },
+         [](E& e) { e.pair.behind_share = above(0.35); }, true},
+        {"swapped NaN", Reason::kSwapped, GroundUse::kNone, [](E&) {},
+         [](E& e) { e.pair.behind_share = kNaN; }, true},
+        {"swapped, few features", Reason::kSwapped, GroundUse::kNone,
+         [](E& e) { e.pair.features = 5, e.pair.behind_share = 1.0; },
+         [](E& e) { e.pair.features = 6, e.pair.behind_share = 1.0; }, true},
+        {"rows down", Reason::kEpipolar, GroundUse::kWeak,
+         [](E& e) { e.pair.row_offset_px = 0.4, e.pair.row_sigma_px = 0.0; },
+         [](E& e) { e.pair.row_offset_px = above(0.4), e.pair.row_sigma_px = 0.0; }},
+        {"rows up", Reason::kEpipolar, GroundUse::kWeak,
+         [](E& e) { e.pair.row_offset_px = -0.4, e.pair.row_sigma_px = 0.0; },
+         [](E& e) { e.pair.row_offset_px = below(-0.4), e.pair.row_sigma_px = 0.0; }},
+        {"rows, not sure", Reason::kEpipolar, GroundUse::kWeak,
+         [](E& e) { e.pair.row_offset_px = 0.59, e.pair.row_sigma_px = 0.1; },
+         [](E& e) { e.pair.row_offset_px = 0.61, e.pair.row_sigma_px = 0.1; }},
+        {"rows, few features", Reason::kEpipolar, GroundUse::kWeak,
+         [](E& e) { e.pair.row_offset_px = 2.0, e.pair.row_features = 7; },
+         [](E& e) { e.pair.row_offset_px = 2.0, e.pair.row_features = 8; }},
+        {"rows NaN", Reason::kEpipolar, GroundUse::kWeak, [](E&) {},
+         [](E& e) { e.pair.row_offset_px = kNaN; }},
+        {"blurred right", Reason::kBlurred, GroundUse::kWeak,
+         [](E& e) { e.pair.left_sharper = 1.08, e.pair.right_sharper = 0.3; },
+         [](E& e) { e.pair.left_sharper = above(1.08), e.pair.right_sharper = 0.3; }},
+        {"blurred left", Reason::kBlurred, GroundUse::kWeak,
+         [](E& e) { e.pair.right_sharper = 1.8, e.pair.left_sharper = 1.0; },
+         [](E& e) { e.pair.right_sharper = above(1.8), e.pair.left_sharper = 1.0; }},
+        {"blurred NaN", Reason::kBlurred, GroundUse::kWeak, [](E&) {},
+         [](E& e) { e.pair.left_sharper = kNaN; }},
     };
     return table;
 }
@@ -203,9 +241,16 @@ TEST(Verdict, AnUnusableGroundIsReplacedByTheRememberedOne) {
         rule.beyond(evidence);
         const State state = remembering(9.0, 100 * kMs);
         const Decision decision = decide(evidence, state, 133 * kMs, kLimits);
-        EXPECT_EQ(decision.verdict, Verdict::kDegraded);
         EXPECT_TRUE(decision.reasons.has(rule.reason));
+        if (rule.hopeless) {
+            EXPECT_EQ(decision.verdict, Verdict::kBlind);
+            EXPECT_EQ(decision.use, GroundUse::kNone);
+            EXPECT_EQ(decision.reasons, set_of({rule.reason}));
+            EXPECT_FALSE(decision.ground.found);
+            continue;
+        }
         const bool held = rule.use == GroundUse::kNone || !evidence.ground.metric;  // pose not comparable
+        EXPECT_EQ(decision.verdict, Verdict::kDegraded);
         EXPECT_EQ(decision.use, held ? GroundUse::kHeld : GroundUse::kWeak);
         EXPECT_EQ(decision.reasons.has(Reason::kHeldGround), held);
         EXPECT_EQ(decision.ground.pose.pitch_rad, held ? rad(9.0) : evidence.ground.pose.pitch_rad);
@@ -271,6 +316,49 @@ TEST(Verdict, APoseMayMoveTwoDegreesAFrame) {
     }
 }
 
+AttitudeInput attitude(double pitch_deg, double roll_deg, double sigma_deg = 0.5) {
+    return {true, rad(pitch_deg), rad(roll_deg), rad(sigma_deg)};
+}
+
+// On a slope of 20 deg: the attitude is 20 deg from the pose to the ground, before the step as after it.
+TEST(Verdict, AStepThatTheAttitudeMadeTooIsNoJump) {
+    const struct {
+        double pitch_deg, roll_deg;  // of the ground found, 10 and 1 before
+        AttitudeInput before, now;
+        bool jump;
+    } table[] = {
+        {15.0, 1.0, attitude(-10, 0), attitude(-5, 0), false},
+        {15.0, 1.0, attitude(-10, 0), attitude(-7.9, 0), false},
+        {15.0, 1.0, attitude(-10, 0), attitude(-8.1, 0), true},
+        {15.0, 1.0, attitude(-10, 0), attitude(-2.1, 0), false},
+        {15.0, 1.0, attitude(-10, 0), attitude(-1.9, 0), true},
+        {15.0, 1.0, attitude(-10, 0), attitude(-15, 0), true},
+        {10.0, 8.0, attitude(0, 0), attitude(0, 7), false},
+        {10.0, 8.0, attitude(0, 0), attitude(0, 3.9), true},
+        {15.0, 1.0, attitude(0, 0), attitude(5, 3.1), true},
+        {15.0, 1.0, attitude(0, 0, 1.6), attitude(5, 0), true},
+        {15.0, 1.0, attitude(0, 0), attitude(5, 0, 1.6), true},
+        {15.0, 1.0, attitude(0, 0), attitude(5, 0, kNaN), true},
+        {15.0, 1.0, attitude(0, 0), attitude(kNaN, 0), true},
+        {15.0, 1.0, AttitudeInput{}, attitude(5, 0), true},
+        {15.0, 1.0, attitude(-5, 0), AttitudeInput{}, true},
+        // Steps that a robot makes need no witness.
+        {11.0, 1.0, attitude(0, 0), attitude(30, 0), false},
+    };
+    for (const auto& each : table) {
+        Evidence evidence = good_evidence();
+        evidence.ground.pose.pitch_rad = rad(each.pitch_deg);
+        evidence.ground.pose.roll_rad = rad(each.roll_deg);
+        evidence.attitude = each.now;
+        State state = remembering(10.0, 0);
+        state.attitude = each.before;
+        const Decision decision = decide(evidence, state, 33 * kMs, kLimits);
+        EXPECT_EQ(decision.reasons.has(Reason::kPoseJump), each.jump)
+            << each.pitch_deg << ' ' << each.roll_deg << ", from " << each.before.pitch_rad << " to "
+            << each.now.pitch_rad;
+    }
+}
+
 TEST(Verdict, EveryReasonThatEvidenceHoldsIsReached) {
     std::set<Reason> reached = {Reason::kNoFrames};  // decide_without_frames
     const auto note = [&](const Decision& decision) {
@@ -284,8 +372,7 @@ TEST(Verdict, EveryReasonThatEvidenceHoldsIsReached) {
         note(decide(evidence, remembering(10.0, 0), 0, kLimits));
     }
     note(decide(good_evidence(), remembering(30.0, 0), 0, kLimits));
-    const std::set<Reason> not_measured = {Reason::kFrozen, Reason::kSwapped, Reason::kEpipolar,
-                                           Reason::kBlurred, Reason::kOverload};
+    const std::set<Reason> not_measured = {Reason::kOverload};
     for (int i = 0; i < kReasons; ++i)
         EXPECT_NE(reached.count(static_cast<Reason>(i)), not_measured.count(static_cast<Reason>(i)))
             << kReasonNames.at(static_cast<std::size_t>(i));
@@ -376,6 +463,35 @@ TEST(Memory, AHeldGroundIsNotRememberedAnew) {
     EXPECT_EQ(run.step(good_evidence(), 2100 * kMs).verdict, Verdict::kTrusted);
 }
 
+TEST(Memory, RemembersTheAttitudeWithTheGround) {
+    Drive run;
+    Evidence evidence = good_evidence();
+    evidence.attitude = attitude(3.0, 1.0);
+    run.step(evidence, 0);
+    EXPECT_EQ(run.state.attitude.pitch_rad, rad(3.0));
+    // A ground that is not believed leaves both alone.
+    evidence.attitude = attitude(4.0, 1.0);
+    evidence.ground_fit.line_found = false;
+    run.step(evidence, 33 * kMs);
+    EXPECT_EQ(run.state.attitude.pitch_rad, rad(3.0));
+    Evidence bump = good_evidence();
+    bump.attitude = attitude(13.0, 1.0);
+    bump.ground.pose.pitch_rad = rad(20.0);
+    EXPECT_EQ(run.step(bump, 66 * kMs).verdict, Verdict::kTrusted);
+}
+
+// Frozen pictures show the robot the same good ground again and again.
+TEST(Memory, AFrozenPictureIsNotRemembered) {
+    Drive run;
+    Evidence evidence = good_evidence();
+    for (int frame = 0; frame < 5; ++frame) {
+        evidence.pair.same_pairs = frame + 1;
+        EXPECT_EQ(run.step(evidence, frame * 33 * kMs).verdict,
+                  frame < 2 ? Verdict::kTrusted : Verdict::kBlind);
+    }
+    EXPECT_EQ(run.state.exposure_mono_ns, 33 * kMs) << "of the last that was believed";
+}
+
 TEST(Memory, StampsThatStandStillHoldNothingForEver) {
     Evidence lost = good_evidence();
     lost.ground_fit.line_found = false;
@@ -445,6 +561,13 @@ struct Chance {
         near_limit(e.photometric.overexposed_share, 0.25);
         near_limit(e.photometric.dark_share, 0.5);
         near_limit(e.photometric.contrast, 10.0);
+        PairEvidence& p = e.pair;
+        p.identical = one_in(40);
+        if (one_in(20)) p.same_pairs = 1 + static_cast<int>(random() % 4);
+        if (one_in(8)) p.behind_share = 0.5 * share();
+        if (one_in(6)) p.row_offset_px = 0.6 * share();
+        if (one_in(6)) p.left_sharper = 1.0 + 0.3 * share();
+        if (one_in(6)) p.right_sharper = 0.5 + 0.3 * share();
         GroundEvidence& f = e.ground_fit;
         f.line_found = !one_in(12);
         f.inside_gate = !one_in(12);
@@ -479,6 +602,16 @@ struct Chance {
         more(e.photometric.overexposed_share);
         more(e.photometric.dark_share);
         less(e.photometric.contrast);
+        PairEvidence& p = e.pair;
+        if (one_in(20)) p.identical = true;
+        if (one_in(8)) ++p.same_pairs;
+        more(p.behind_share);
+        more(p.row_offset_px);
+        less(p.row_sigma_px);
+        if (p.left_sharper > p.right_sharper) {
+            more(p.left_sharper);
+            less(p.right_sharper);
+        }
         GroundEvidence& f = e.ground_fit;
         if (one_in(8)) f.line_found = false;
         if (one_in(8)) f.inside_gate = false;
@@ -535,7 +668,8 @@ TEST(Verdict, TrustAndUseGoTogether) {
         ASSERT_EQ(decision.verdict == Verdict::kBlind, decision.use == GroundUse::kNone);
         ASSERT_EQ(decision.reasons.has(Reason::kHeldGround), decision.use == GroundUse::kHeld);
         ASSERT_EQ(decision.ground.found, decision.use != GroundUse::kNone);
-        if (!evidence.calibrated || !evidence.checked || evidence.ground_fit.wall) {
+        if (!evidence.calibrated || !evidence.checked || evidence.ground_fit.wall ||
+            evidence.pair.identical || evidence.pair.same_pairs > 2) {
             ASSERT_NE(decision.verdict, Verdict::kTrusted);
         }
         if (decision.verdict != Verdict::kTrusted) {
