@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -13,6 +12,7 @@
 #include <vector>
 
 #include "cli/evaluate_set.hpp"
+#include "cli/figures.hpp"
 #include "cli/matcher_table.hpp"
 #include "cli/terrain_table.hpp"
 #include "cli/truth_sets.hpp"
@@ -25,12 +25,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
-using Figure = std::optional<double>;  // none: there was nothing to measure
-
-Figure share(std::int64_t part, std::int64_t whole) {
-    if (whole == 0) return std::nullopt;
-    return static_cast<double>(part) / static_cast<double>(whole);
-}
 
 // The figures a set is judged by, in the order of the suite's columns.
 struct Metric {
@@ -100,12 +94,6 @@ const std::array kMetrics = {
 const Metric& metric(std::string_view key) {
     return *std::find_if(kMetrics.begin(), kMetrics.end(),
                          [&](const Metric& each) { return each.key == key; });
-}
-
-// Six decimals are enough for every figure and keep the last bits of a division out of the text.
-ordered_json number(const Figure& figure) {
-    if (!figure) return nullptr;
-    return std::round(*figure * 1e6) / 1e6;
 }
 
 std::string shown(const Metric& which, const Figure& figure) {
@@ -285,16 +273,7 @@ void print_suite(const std::vector<SuiteRow>& rows) {
     for (const Metric& each : kMetrics)
         if (each.column != nullptr) lines.back().push_back(shown(each, mean_of(rows, each)));
 
-    std::vector<std::size_t> widths(lines[0].size(), 0);
-    for (const auto& line : lines)
-        for (std::size_t i = 0; i < line.size(); ++i)
-            widths[i] = std::max(widths[i], line[i].size());
-    for (const auto& line : lines) {
-        fmt::print("{:<{}}", line[0], widths[0]);
-        for (std::size_t i = 1; i < line.size(); ++i)
-            fmt::print("  {:>{}}", line[i], widths[i]);
-        fmt::print("\n");
-    }
+    fmt::print("{}", aligned(lines, 1));
     fmt::print(
         "in per cent unless a unit is named; +abs: absent counted bad; obst, gnd, drop: pixels that are so "
         "in the "

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -13,6 +12,7 @@
 
 #include "capture/open.hpp"
 #include "cli/compared_matchers.hpp"
+#include "cli/figures.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/perturbation.hpp"
 #include "cli/step_progress.hpp"
@@ -238,11 +238,6 @@ constexpr std::array kColumns = {
     Column{"bad3_with_absent", "bad-3+abs", &MatcherFigures::bad3_with_absent},
 };
 
-std::optional<double> share(std::int64_t part, std::int64_t whole) {
-    if (whole == 0) return std::nullopt;
-    return static_cast<double>(part) / static_cast<double>(whole);
-}
-
 void add(const DisparityScore& from, DisparityScore& to) {
     to.occluded += from.occluded;
     to.scored += from.scored;
@@ -341,12 +336,6 @@ void print_table(const Job& job, const std::vector<MatcherGroup>& groups) {
         cv::getVersionString());
     for (const MatcherChoice& matcher : job.matchers)
         fmt::print("  {:<{}}  {}\n", matcher.name, name_width, matcher.parameters);
-}
-
-// Six decimals are enough for every figure and keep the last bits of a division out of the text.
-ordered_json number(const std::optional<double>& figure) {
-    if (!figure) return nullptr;
-    return std::round(*figure * 1e6) / 1e6;
 }
 
 ordered_json results_json(const Job& job, const std::vector<MatcherFigures>& figures) {

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <cmath>
 #include <cstdio>
 #include <map>
 #include <mutex>
@@ -15,6 +14,7 @@
 #include <string_view>
 #include <thread>
 
+#include "cli/figures.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/run_setup.hpp"
 #include "cli/step_progress.hpp"
@@ -31,14 +31,8 @@ namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
-using Figure = std::optional<double>;  // none: there was nothing to measure
 
 constexpr std::array<const char*, kTerrainMethods> kMethodNames = {"groundline", "baseline"};
-
-Figure share(std::int64_t part, std::int64_t whole) {
-    if (whole == 0) return std::nullopt;
-    return static_cast<double>(part) / static_cast<double>(whole);
-}
 
 using P = const TerrainPool&;
 struct Metric {
@@ -113,7 +107,6 @@ Table tabled(const std::vector<JudgedUnit>& units, bool grouped) {
     return table;
 }
 
-// ---
 std::string shown(const Metric& metric, P pool) {
     const Figure figure = metric.of(pool);
     return figure ? fmt::format("{:.{}f}", *figure * metric.table_scale, metric.decimals) : "-";
@@ -131,19 +124,6 @@ std::vector<std::vector<std::string>> lines_of(const Row& row) {
     return lines;
 }
 
-void print_lines(const std::vector<std::vector<std::string>>& lines) {
-    std::vector<std::size_t> widths(lines.front().size(), 0);
-    for (const auto& line : lines)
-        for (std::size_t i = 0; i < line.size(); ++i)
-            widths[i] = std::max(widths[i], line[i].size());
-    for (const auto& line : lines) {
-        std::string text = fmt::format("{:<{}}  {:<{}}", line[0], widths[0], line[1], widths[1]);
-        for (std::size_t i = 2; i < line.size(); ++i)
-            text += fmt::format("  {:>{}}", line[i], widths[i]);
-        fmt::print("{}\n", text);
-    }
-}
-
 std::string reasons_text(Reasons reasons) {
     std::string text;
     for (int i = 0; i < kReasons; ++i)
@@ -152,35 +132,26 @@ std::string reasons_text(Reasons reasons) {
     return text;
 }
 
-void print_times(const Row& all) {
-    fmt::print("time a frame, medians:");
-    for (std::size_t method = 0; method < kTerrainMethods; ++method)
-        fmt::print(" {} {} match {:.2f} ms, terrain {:.2f} ms", method == 0 ? "" : ";", kMethodNames[method],
-                   median_of(all.pools[method].match_ms).value_or(0.0),
-                   median_of(all.pools[method].terrain_ms).value_or(0.0));
-    fmt::print("\n");
+// What was said of pictures that must not be trusted: how often each verdict with its reasons, by scene.
+void print_verdicts(const Table& table, const std::vector<JudgedUnit>& units) {
+    std::vector<std::vector<std::string>> lines = {{"scene", "frames", "verdict", "reasons"}};
+    for (const Row& row : table.rows) {
+        std::map<std::pair<Verdict, std::uint32_t>, int> counts;
+        for (const JudgedUnit& unit : units)
+            for (const JudgedFrame& frame : unit.frames)
+                if (frame.set == row.name)
+                    ++counts[{frame.scores[0].verdict, frame.scores[0].reasons.bits()}];
+        for (const auto& [said, count] : counts)
+            lines.push_back({row.name, std::to_string(count),
+                             std::string(kVerdictNames[static_cast<std::size_t>(said.first)]),
+                             reasons_text(Reasons(said.second))});
+    }
+    fmt::print("{}trusted: {} of {} frames\n", aligned(lines, 4), table.all.pools[0].verdicts[2],
+               units.size());
 }
 
-// How often each set of reasons was given with each verdict, by scene.
-void print_reasons(const std::vector<JudgedUnit>& units) {
-    std::vector<std::string> scenes;
-    std::map<std::pair<std::string, std::string>, int> counts;
-    for (const JudgedUnit& unit : units)
-        for (const JudgedFrame& frame : unit.frames) {
-            if (std::find(scenes.begin(), scenes.end(), frame.set) == scenes.end())
-                scenes.push_back(frame.set);
-            const FrameScore& ours = frame.scores[0];
-            ++counts[{frame.set, fmt::format("{}: {}", kVerdictNames[static_cast<std::size_t>(ours.verdict)],
-                                             reasons_text(ours.reasons))}];
-        }
-    for (const std::string& scene : scenes)
-        for (const auto& [key, count] : counts)
-            if (key.first == scene) fmt::print("{:<16} {:>4} x {}\n", scene, count, key.second);
-}
-
-void print_table(const Table& table, const std::vector<JudgedUnit>& units, const Suite* suite) {
-    std::vector<std::vector<std::string>> lines = {
-        {suite != nullptr ? "scene" : "set", "", "trust/degr/blind"}};
+void print_figures(const Table& table, const char* what) {
+    std::vector<std::vector<std::string>> lines = {{what, "", "trust/degr/blind"}};
     for (const Metric& metric : kMetrics)
         lines[0].emplace_back(metric.title);
     const auto append = [&](const Row& row) {
@@ -192,18 +163,46 @@ void print_table(const Table& table, const std::vector<JudgedUnit>& units, const
     for (const Row& row : table.groups)
         append(row);
     append(table.all);
-    if (suite != nullptr && suite->study == Study::kNever)
-        print_reasons(units);
-    else
-        print_lines(lines);
-    print_times(table.all);
+    fmt::print("{}", aligned(lines, 2));
 }
 
-// ---
-// Six decimals are enough for every figure and keep the last bits of a division out of the text.
-ordered_json number(const Figure& figure) {
-    if (!figure) return nullptr;
-    return std::round(*figure * 1e6) / 1e6;
+void print_legend(bool rendered) {
+    fmt::print(
+        "In per cent of the pixels that are so in the truth and that both cameras see: obst, drop found; "
+        "o.free, d.free\nshown as free; g.alarm ground shown as obstacle or drop, g.known as anything but "
+        "unknown. Pitch and roll in deg,\nheight in per cent: median and largest error of the frames with a "
+        "ground. f.obst, f.frames: false obstacles, and\nframes with any, where nothing stands. ditch: "
+        "share of the ditches of whose pixels at most 1 % are shown as\nfree; b.lip: share with every "
+        "sector's free range ending before the lip; lip m: the farthest beyond it.\n");
+    if (rendered)
+        fmt::print(
+            "Judged out to min({} m, f b tolerance / (3 h 0.25 px)): obstacles from {} m up, ground within "
+            "{} m, drops {} m\ndeeper than the tolerance.\n",
+            kJudgedRange, kStandsOut, kGroundWithin, kDeeperThanDrop);
+    else
+        fmt::print("Judged out to {} m: obstacles above {} m, ground within {} m.\n", kJudgedRange,
+                   kObstacleAbove, kGroundWithin);
+    fmt::print("Baseline: {}. It is trusted where it finds a ground.\n", TerrainBaseline::parameters());
+}
+
+void print_times(const Row& all) {
+    fmt::print("Time a frame, medians:");
+    for (std::size_t method = 0; method < kTerrainMethods; ++method)
+        fmt::print("{} {} matching {:.2f} ms, terrain {:.2f} ms", method == 0 ? "" : ";",
+                   kMethodNames[method], median_of(all.pools[method].match_ms).value_or(0.0),
+                   median_of(all.pools[method].terrain_ms).value_or(0.0));
+    fmt::print(".\n");
+}
+
+void print_table(const Table& table, const std::vector<JudgedUnit>& units,
+                 const std::optional<Suite>& suite) {
+    if (suite && suite->study == Study::kNever) {
+        print_verdicts(table, units);
+    } else {
+        print_figures(table, suite ? "scene" : "set");
+        print_legend(suite.has_value());
+    }
+    print_times(table.all);
 }
 
 ordered_json counts_json(const TerrainScore& score) {
@@ -293,7 +292,6 @@ ordered_json table_json(const TerrainTableOptions& options, const Table& table,
     return root;
 }
 
-// ---
 // Runs them on all lanes; the results stand in their order. What is not done was interrupted.
 template <typename Run>
 std::vector<JudgedUnit> run_all(std::size_t count, int threads, const std::atomic<bool>& stop, Run run) {
@@ -350,7 +348,7 @@ int run_terrain_table(const TerrainTableOptions& options) {
     if (options.json)
         fmt::print("{}\n", table_json(options, table, units).dump(2));
     else
-        print_table(table, units, suite ? &*suite : nullptr);
+        print_table(table, units, suite);
     std::fflush(stdout);
     int status = 0;
     std::size_t done = 0;

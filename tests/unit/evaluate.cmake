@@ -6,8 +6,10 @@ find_package(nlohmann_json REQUIRED)
 find_package(OpenCV 4.6 REQUIRED COMPONENTS core calib3d imgproc)
 groundline_test(evaluate
   SOURCES unit/evaluate_test.cpp unit/evaluation_test.cpp unit/evaluate_matchers_test.cpp
-          unit/evaluate_perturbation_test.cpp ${cli}/compared_matchers.cpp ${cli}/evaluate_command.cpp
-          ${cli}/evaluate_options.cpp ${cli}/evaluate_set.cpp ${cli}/evaluation.cpp ${cli}/interrupt.cpp
+          unit/evaluate_perturbation_test.cpp unit/evaluate_terrain_test.cpp
+          ${cli}/compared_matchers.cpp ${cli}/evaluate_command.cpp
+          ${cli}/evaluate_options.cpp ${cli}/evaluate_set.cpp ${cli}/evaluation.cpp ${cli}/figures.cpp
+          ${cli}/interrupt.cpp
           ${cli}/matcher_table.cpp ${cli}/perturbation.cpp ${cli}/plane_search.cpp ${cli}/run_setup.cpp
           ${cli}/step_progress.cpp ${cli}/terrain_baseline.cpp ${cli}/terrain_judge.cpp ${cli}/terrain_run.cpp
           ${cli}/terrain_suite.cpp ${cli}/terrain_table.cpp ${cli}/truth_ground.cpp ${cli}/truth_labels.cpp

@@ -17,6 +17,7 @@
 #include "core/error.hpp"
 #include "io/png.hpp"
 #include "support/random_images.hpp"
+#include "unit/evaluate_support.hpp"
 
 namespace groundline::cli {
 namespace {
@@ -183,7 +184,7 @@ TEST(MatcherGroups, SparseTruthIsPooledAndDenseAveraged) {
     EXPECT_EQ(groups[3].name, "alone");
 }
 
-class MatcherTable : public testing::Test {
+class MatcherTable : public CommandTest {
   protected:
     MatcherTable() {
         std::string pattern = testing::TempDir() + "matchers-XXXXXX";
@@ -210,19 +211,7 @@ class MatcherTable : public testing::Test {
                       ConstImageView<std::uint16_t>(truth.data(), width, pair.left.height(), width));
     }
     int run() {
-        testing::internal::CaptureStdout();
-        testing::internal::CaptureStderr();
-        int status = -1;
-        sentence_.clear();
-        try {
-            status = run_matcher_table(options_);
-        } catch (const Refusal& refusal) {
-            status = static_cast<int>(refusal.status());
-            sentence_ = refusal.what();
-        }
-        out_ = testing::internal::GetCapturedStdout();
-        err_ = testing::internal::GetCapturedStderr();
-        return status;
+        return kept([&] { return run_matcher_table(options_); });
     }
     // The results of a set under one condition, without its name.
     static json results(const json& table, const std::string& set, const std::string& condition) {
@@ -240,7 +229,6 @@ class MatcherTable : public testing::Test {
 
     fs::path suite_;
     MatcherTableOptions options_;
-    std::string out_, err_, sentence_;
 };
 
 TEST_F(MatcherTable, RightAnswersAreRightForEveryMatcher) {

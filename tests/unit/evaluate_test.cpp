@@ -15,6 +15,7 @@
 #include "core/error.hpp"
 #include "core/ground.hpp"
 #include "io/png.hpp"
+#include "unit/evaluate_support.hpp"
 
 namespace groundline::cli {
 
@@ -33,7 +34,7 @@ using nlohmann::json;
 constexpr int kWidth = 8;
 constexpr int kHeight = 2;
 
-class Evaluate : public testing::Test {
+class Evaluate : public CommandTest {
   protected:
     Evaluate() {
         std::string pattern = testing::TempDir() + "evaluate-XXXXXX";
@@ -100,19 +101,7 @@ class Evaluate : public testing::Test {
     }
 
     int run(EvaluateOptions options) {
-        testing::internal::CaptureStdout();
-        testing::internal::CaptureStderr();
-        status_ = -1;
-        sentence_.clear();
-        try {
-            status_ = run_evaluate(options);
-        } catch (const Refusal& refusal) {
-            status_ = static_cast<int>(refusal.status());
-            sentence_ = refusal.what();
-        }
-        out_ = testing::internal::GetCapturedStdout();
-        err_ = testing::internal::GetCapturedStderr();
-        return status_;
+        return kept([&] { return run_evaluate(options); });
     }
     int run_pair(bool as_json = true) {
         EvaluateOptions options;
@@ -123,8 +112,6 @@ class Evaluate : public testing::Test {
     }
 
     fs::path root_;
-    int status_ = -1;
-    std::string out_, err_, sentence_;
 };
 
 TEST_F(Evaluate, FiguresOfAHandMadeSet) {
