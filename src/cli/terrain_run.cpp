@@ -28,9 +28,9 @@ namespace fs = std::filesystem;
 // A processor for judging and, so that times are those of warm memory, another of which they are taken.
 class Ours {
   public:
-    Ours(const settings::Settings& settings, const rig::Rectifier& rectifier)
-        : judged_(processor_config(settings, false), rectifier, serial_, arena_),
-          timed_(processor_config(settings, false), rectifier, serial_, arena_),
+    Ours(const settings::Settings& settings, bool live, const rig::Rectifier& rectifier)
+        : judged_(config_of(settings, live), rectifier, serial_, arena_),
+          timed_(config_of(settings, false), rectifier, serial_, arena_),
           result_(judged_.make_result(arena_)),
           timed_result_(judged_.make_result(arena_)) {}
 
@@ -46,6 +46,12 @@ class Ours {
     }
 
   private:
+    static pipeline::ProcessorConfig config_of(const settings::Settings& settings, bool live) {
+        pipeline::ProcessorConfig config = processor_config(settings, false);
+        config.live = live;
+        return config;
+    }
+
     Arena arena_;
     Serial serial_;
     pipeline::Processor judged_;
@@ -75,9 +81,9 @@ std::int64_t at(const StageTimes& times, Stage stage) {
 // Both methods for pictures of one rig.
 class Judge {
   public:
-    Judge(const settings::Settings& settings, const rig::Rectifier& rectifier)
+    Judge(const settings::Settings& settings, bool live, const rig::Rectifier& rectifier)
         : rectifier_(rectifier),
-          ours_(settings, rectifier),
+          ours_(settings, live, rectifier),
           baseline_(rectifier.rig(), settings.matcher.min_disparity, settings.matcher.disparities,
                     settings.terrain.tolerance_up_m),
           mask_(arena_.image<TerrainClass>(rectifier.rig().width, rectifier.rig().height)),
@@ -177,7 +183,7 @@ class SetJudge {
         rectifier_ = std::make_unique<rig::Rectifier>(calibration, info.width, info.height, arena_);
         settings::Settings chosen = settings;
         choose_disparities(info.width, calibration.disparities_hint, chosen);
-        judge_ = std::make_unique<Judge>(chosen, *rectifier_);
+        judge_ = std::make_unique<Judge>(chosen, false, *rectifier_);
         frame_ = StereoFrame::make(arena_, info.width, info.height, info.colour);
         seen_ = arena_.image<TerrainClass>(info.width, info.height);
         all_ = arena_.image<TerrainClass>(info.width, info.height);
@@ -291,9 +297,10 @@ JudgedUnit judge_rendered(const SuiteFrame& asked, const settings::Settings& set
     truth.empty = scene.things.empty() && !scene.strewn && scene.wall_z_m <= 0.0;
     if (dug) truth.ditch_lip_m = scene.trenches.front().near_m;
 
-    Judge both(chosen, rectifier);
+    const bool frozen = asked.picture == Picture::kFrozen;
+    Judge both(chosen, frozen, rectifier);
     both.run(frame);
-    for (int i = 1; asked.picture == Picture::kFrozen && i < kFrozenPairs; ++i) {
+    for (int i = 1; frozen && i < kFrozenPairs; ++i) {
         ++frame.stamp.sequence;
         frame.stamp.position = frame.stamp.sequence;
         frame.stamp.exposure_mono_ns += kFrameNs;

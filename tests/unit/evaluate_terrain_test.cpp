@@ -538,6 +538,11 @@ TEST(JudgeRendered, EveryPictureDiffersFromTheRenderedPair) {
     }
 }
 
+TEST(JudgeRendered, FrozenPicturesComeFromALiveSource) {
+    EXPECT_TRUE(judged(kSmallBoxes, Picture::kFrozen).scores[0].reasons.has(Reason::kFrozen));
+    EXPECT_FALSE(judged(kSmallBoxes).scores[0].reasons.has(Reason::kFrozen));
+}
+
 class TerrainTable : public CommandTest {
   protected:
     TerrainTable() {
