@@ -56,12 +56,13 @@ std::optional<rig::StereoCalibration> load_calibration(const ReplayOptions& opti
     return io::read_calibration(files, info.width, info.height, opened.colour_pair);
 }
 
-publish::LcmOptions lcm_options(const settings::PublishSettings& settings, Counters& counters) {
+publish::LcmOptions lcm_options(const settings::Settings& settings, Counters& counters) {
     publish::LcmOptions options;
-    options.url = settings.url;
-    options.prefix = settings.prefix;
-    options.channels.v_disparity = settings.v_disparity;
-    options.channels.preview = settings.preview;
+    options.url = settings.publish.url;
+    options.prefix = settings.publish.prefix;
+    options.channels.v_disparity = settings.publish.v_disparity;
+    options.channels.preview = settings.publish.preview;
+    options.channels.grid = settings.grid.on;
     options.counters = &counters;
     return options;
 }
@@ -114,7 +115,7 @@ int run_replay(const ReplayOptions& options) {
     std::vector<pipeline::SinkSlot> sinks{{&statistics, std::nullopt, true}};
     std::optional<publish::LcmPublisher> publisher;
     if (options.lcm) {
-        publisher.emplace(lcm_options(settings.publish, counters));
+        publisher.emplace(lcm_options(settings, counters));
         sinks.push_back({&*publisher, Stage::kPublish, false});
     }
     if (writer) sinks.push_back({&*writer, Stage::kWrite, true});

@@ -37,6 +37,7 @@ pipeline::ProcessorConfig processor_config(const settings::Settings& settings, b
     pipeline::ProcessorConfig config;
     config.matcher = settings.matcher;
     config.terrain = settings::terrain_config(settings);
+    config.grid = settings.grid;
     config.limits = settings::verdict_limits(settings);
     config.colour = colour;
     return config;

@@ -67,6 +67,9 @@ Processor::Processor(const ProcessorConfig& config, const rig::Rectifier& rectif
                     unusable_right_, arena) {
     assert(config.body.empty() || config.body.same_size(rectifier.rig().width, rectifier.rig().height));
     config_.body = {};
+    if (config.grid.on)
+        elevation_grid_.emplace(config.grid, config.terrain, rectifier.rig(), matcher_->min_disparity(),
+                                matcher_->disparities(), arena);
 }
 
 FrameResult Processor::make_result(Arena& arena) const {
@@ -79,6 +82,7 @@ FrameResult Processor::make_result(Arena& arena) const {
     if (config_.colour) result.left_bgr = arena.bgr_image(rig.width, rig.height);
     result.disparity = DisparityMap::make(arena, rig.width, rig.height);
     result.mask = arena.image<TerrainClass>(rig.width, rig.height);
+    result.grid = terrain::make_terrain_grid(config_.grid, arena);
     result.v_disparity =
         terrain::make_v_disparity(arena, rig.height, matcher_->min_disparity(), matcher_->disparities());
     return result;
@@ -121,6 +125,7 @@ void Processor::process(const StereoFrame& frame, FrameResult& result) {
     classifier_.classify(result.disparity, result.ground, decision.use, ground_finder_.supported_rows(),
                          result.mask, result.obstacles, result.range_limit_m, parallel_);
     sector_finder_.find(result.disparity, result.ground, result.mask, result.sectors);
+    if (elevation_grid_) elevation_grid_->find(result.disparity, result.ground, result.mask, result.grid);
     terrain::shares_of(result.mask, result.share);
     clock.end(Stage::kClassify);
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "core/arena.hpp"
 #include "core/frame.hpp"
@@ -13,6 +14,7 @@
 #include "stereo/matcher.hpp"
 #include "terrain/classifier.hpp"
 #include "terrain/config.hpp"
+#include "terrain/elevation_grid.hpp"
 #include "terrain/ground_finder.hpp"
 #include "terrain/sectors.hpp"
 #include "verdict/verdict.hpp"
@@ -22,6 +24,7 @@ namespace groundline::pipeline {
 struct ProcessorConfig {
     stereo::MatcherConfig matcher;
     terrain::TerrainConfig terrain;
+    terrain::GridConfig grid;
     verdict::Limits limits;
     bool colour = false;  // the source has colour and a sink draws it
     bool live = false;    // pairs come from cameras, which never deliver the same picture twice
@@ -57,6 +60,7 @@ class Processor {
     terrain::GroundFinder ground_finder_;
     terrain::Classifier classifier_;
     terrain::SectorFinder sector_finder_;
+    std::optional<terrain::ElevationGrid> elevation_grid_;  // where the configuration asks for it
     Luma right_;
     // Where the window of a match would reach beyond the source picture or into the robot's own parts: the
     // reason, an Invalid; 0 elsewhere. Empty where it nowhere does.

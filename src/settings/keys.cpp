@@ -295,6 +295,20 @@ std::vector<Key> make_keys() {
                           GROUNDLINE_MEMBER(publish.v_disparity)));
     keys.push_back(on_off("publish.preview", "Publish a small picture of the left view too.",
                           GROUNDLINE_MEMBER(publish.preview)));
+
+    keys.push_back(on_off("grid.publish",
+                          "Grade the ground cell by cell (elevation, slope, roughness, step, traversability "
+                          "index) and publish that too.",
+                          GROUNDLINE_MEMBER(grid.on)));
+    keys.push_back(number("grid.cell_m", 0.02, 2.0, "Edge of a cell; one message holds 6500 cells.",
+                          GROUNDLINE_MEMBER(grid.cell_m)));
+    keys.push_back(number("grid.forward_m", 0.1, 200.0,
+                          "How far the cells reach ahead of the robot's origin.",
+                          GROUNDLINE_MEMBER(grid.forward_m)));
+    keys.push_back(number("grid.side_m", 0.1, 200.0, "How far they reach to either side of it.",
+                          GROUNDLINE_MEMBER(grid.side_m)));
+    keys.push_back(number("grid.steep_deg", 2.0, 60.0, "A slope from which on a cell's index is 0.",
+                          GROUNDLINE_MEMBER(grid.steep_deg)));
     return keys;
 }
 

@@ -10,6 +10,7 @@
 
 #include "stereo/matcher.hpp"
 #include "terrain/config.hpp"
+#include "terrain/elevation_grid.hpp"
 #include "verdict/verdict.hpp"
 
 namespace groundline::settings {
@@ -36,6 +37,7 @@ struct Settings {
     stereo::MatcherConfig matcher;
     bool auto_disparities = true;    // stereo.disparities: auto
     terrain::TerrainConfig terrain;  // without the mount: see terrain_config()
+    terrain::GridConfig grid;
     MountSettings mount;
     PublishSettings publish;
 };
