@@ -285,6 +285,10 @@ std::vector<Key> make_keys() {
                           GROUNDLINE_MEMBER(mount.y_m)));
     keys.push_back(number("mount.yaw_deg", -180.0, 180.0, "Where the camera looks, positive to the left.",
                           GROUNDLINE_MEMBER(mount.yaw_deg)));
+    keys.push_back(text("mount.body_mask", "polygons 'x,y x,y x,y; ...' or the path of a picture",
+                        "The robot's own parts in the rectified left picture, in its pixels, or a picture of "
+                        "its size that is not black there: left out everywhere.",
+                        GROUNDLINE_MEMBER(mount.body_mask)));
 
     keys.push_back(text("publish.url", "an LCM URL",
                         "LCM provider; empty: LCM_DEFAULT_URL, else the library's.",

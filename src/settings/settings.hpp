@@ -22,7 +22,8 @@ struct MountSettings {
     std::optional<double> roll_deg;
     double x_m = 0.0;
     double y_m = 0.0;
-    double yaw_deg = 0.0;  // positive to the left
+    double yaw_deg = 0.0;   // positive to the left
+    std::string body_mask;  // polygons or the path of a picture, see io/body_mask.hpp; empty: none
 };
 
 struct PublishSettings {
