@@ -275,8 +275,8 @@ void ElevationGrid::add_things(ConstDisparityMap map, const View& view, ConstMas
         const Invalid* invalid = map.invalid.row(v);
         for (int first = 0; first < mask.width; first += 8) {
             const int end = std::min(first + 8, mask.width);
-            std::uint64_t word = kThingBits;
-            if (end - first == 8) std::memcpy(&word, kinds + first, 8);
+            std::uint64_t word = 0;
+            std::memcpy(&word, kinds + first, 8);  // the last may reach into the padding: no harm but a look
             if ((word & kThingBits) == 0) continue;
             for (int u = first; u < end; ++u) {
                 if (kinds[u] != TerrainClass::kObstacle && kinds[u] != TerrainClass::kDrop) continue;

@@ -36,7 +36,7 @@ TerrainConfig noiseless(double tolerance_m = 0.20) {
 struct Bench {
     TerrainConfig config;
     GridConfig grid_config;
-    RectifiedRig rig = rig_of();
+    RectifiedRig rig;
     GroundPose pose = pose_deg(14.0, 2.0, 1.2);
     Arena arena;
     ElevationGrid finder;
@@ -45,9 +45,10 @@ struct Bench {
     TerrainGrid grid;
     Ground ground;
 
-    explicit Bench(const TerrainConfig& terrain = noiseless(), GridConfig wanted = {})
+    explicit Bench(const TerrainConfig& terrain = noiseless(), GridConfig wanted = {}, int width = 640)
         : config(terrain),
           grid_config(on(wanted)),
+          rig(rig_of(width)),
           finder(grid_config, config, rig, 0, kDisparities, arena),
           map(DisparityMap::make(arena, rig.width, rig.height)),
           mask(arena.image<TerrainClass>(rig.width, rig.height)),
@@ -258,6 +259,19 @@ TEST(Grid, NarrowBumpIsAStep) {
     EXPECT_GT(cells, 20);
 }
 
+// Slopes that lean apart explain no rise: what is left of a ridge is its height over the middle of its sides.
+TEST(Grid, RidgeIsNotTwiceAStep) {
+    Bench bench(noiseless(0.5));
+    const double rise = std::tan(det::radians(20.0));
+    bench.see([=](double, double y) { return 0.2 - rise * std::fabs(y - 0.05); });
+    int cells = 0;
+    for (double x = 2.25; x < 3.5; x += 0.1, ++cells) {
+        ASSERT_LT(bench.at(x, 0.05).step_m, 1.2 * rise * 0.1 + 3.0 * bench.quantum_m(x)) << x;
+        ASSERT_GT(bench.at(x, 0.05).step_m, 0.4 * rise * 0.1) << x;
+    }
+    EXPECT_GT(cells, 10);
+}
+
 // Waves shorter than the window: their RMS is amplitude / sqrt 2 in each direction.
 TEST(Grid, RoughnessIsTheDeviationFromThePlane) {
     for (const double amplitude : {0.01, 0.02, 0.04}) {
@@ -397,7 +411,7 @@ TEST(Grid, DropIsADropAndItsLipAStep) {
 // Any mask at all: the cells say nothing better than its pixels.
 TEST(Grid, ObeysTheMask) {
     test::Dice dice(11);
-    Bench bench;
+    Bench bench(noiseless(), {}, 637);
     bench.see([](double, double) { return 0.0; });
     const test::Rays rays({bench.rig, bench.pose, {}});
     for (int trial = 0; trial < 4; ++trial) {
