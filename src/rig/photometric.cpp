@@ -13,17 +13,20 @@ constexpr std::size_t kLevels = 256;
 // Enough to keep sky and ground apart, few enough that 16 kB of histograms fit on the stack; 16 or 32 bands
 // are only 0.05 grey levels better.
 constexpr int kBands = 8;
+// Rows looked at, at least: all of a small picture, every second at VGA, which changes the gain of real pairs
+// by 0.003 at most and saves half the time.
+constexpr int kLeastRows = 240;
 constexpr int kRanksPerBand = 17;  // 10 %, 15 % .. 90 %
 
 class Histogram {
   public:
-    void add_rows(ConstLuma image, int first, int end) {
-        for (int y = first; y < end; ++y) {
+    void add_rows(ConstLuma image, int first, int end, int step) {
+        for (int y = first; y < end; y += step) {
             const std::uint8_t* row = image.row(y);
             for (int x = 0; x < image.width; ++x)
                 ++counts_[row[x]];
+            pixels_ += static_cast<std::uint32_t>(image.width);
         }
-        pixels_ += static_cast<std::uint32_t>(end - first) * static_cast<std::uint32_t>(image.width);
     }
     void add(const Histogram& other) {
         for (std::size_t level = 0; level < kLevels; ++level)
@@ -139,7 +142,8 @@ PhotometricEvidence measure_photometric(ConstLuma left, ConstLuma right, Paralle
         const ConstLuma& image = task < kBands ? left : right;
         const int band = task % kBands;
         (task < kBands ? left_bands : right_bands)[static_cast<std::size_t>(band)].add_rows(
-            image, image.height * band / kBands, image.height * (band + 1) / kBands);
+            image, image.height * band / kBands, image.height * (band + 1) / kBands,
+            std::max(1, image.height / kLeastRows));
     });
     Histogram left_all;
     Histogram right_all;

@@ -16,10 +16,10 @@ inline constexpr int kDarkLevel = 12;
 // right
 // + offset through them. `mismatch` is the mean |gain * right + offset - right| over the right view's
 // quantiles at 5 % .. 95 %; where no line fits, the mean difference of the two views' quantiles.
-// The shares of saturated and dark pixels are of the lower half of the picture (its last four bands), they
-// and the contrast of the worse view. On pairs with dense truth the line is off by 1.4 grey levels in the
-// mean, by up to 5 where the views see different things. Views may differ in size, neither may be empty. No
-// allocation; the same on any number of lanes.
+// At least 240 rows are looked at. The shares of saturated and dark pixels are of the lower half of the
+// picture (its last four bands), they and the contrast of the worse view. On pairs with dense truth the line
+// is off by 1.4 grey levels in the mean, by up to 5 where the views see different things. Views may differ in
+// size, neither may be empty. No allocation; the same on any number of lanes.
 PhotometricEvidence measure_photometric(ConstLuma left, ConstLuma right, Parallel& parallel);
 
 }  // namespace groundline::rig

@@ -220,6 +220,17 @@ TEST(PairMonitor, WhereNothingCanBeFollowedNothingIsSaid) {
     EXPECT_EQ(noise.matched, 0);
 }
 
+// A fence: every post matches as well as its neighbours.
+TEST(PairMonitor, ARepeatedPatternSaysNothing) {
+    const OwnedLuma posts = blurred(groundline::test::textured_image(24, 480, 6), 1.0);
+    OwnedPair fence{OwnedLuma(640, 480), OwnedLuma(640, 480)};
+    fence.left.fill([&](int x, int y) { return posts.at(x % 24, y); });
+    fence.right.fill([&](int x, int y) { return posts.at((x + 10) % 24, y); });
+    const PairEvidence evidence = measured(fence);
+    EXPECT_GE(evidence.patches, 80);
+    EXPECT_EQ(evidence.matched, 0);
+}
+
 // The right half is the robot itself, of a texture that lies beyond infinity.
 TEST(PairMonitor, LooksAtNoExcludedPixel) {
     const OwnedPair pair = seen_pair(640, 480, 5, [](int x, int) { return x < 320 ? 20 : -20; });
