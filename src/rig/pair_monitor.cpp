@@ -22,6 +22,7 @@ constexpr int kLeastSteps = kPatchPixels * 6;
 // sets at most 2 of 100 such matches are wrong.
 constexpr double kLeastMatch = 0.85;
 constexpr double kUnique = 2.0;
+constexpr double kLeastMargin = 0.02;  // and by this, where the best is perfect: the posts of a fence
 
 constexpr int kFine = 12;  // full px
 constexpr int kFinePixels = kFine * kFine;
@@ -425,7 +426,7 @@ void PairMonitor::measure_band(ConstLuma left, ConstLuma right, int band, int sh
         for (int place = low; place <= last; ++place)
             if (place < best_at - 2 || place > best_at + 2)
                 second = std::max(second, scores[static_cast<std::size_t>(place)]);
-        if (1.0 - std::sqrt(second) < kUnique * (1.0 - std::sqrt(best))) continue;
+        if (1.0 - std::sqrt(second) < kUnique * (1.0 - std::sqrt(best)) + kLeastMargin) continue;
         const double refined = peak_of(scores[static_cast<std::size_t>(best_at - 1)], best,
                                        scores[static_cast<std::size_t>(best_at + 1)]);
         feature.disparity_px = (chosen - best_at - refined) * scale_;
