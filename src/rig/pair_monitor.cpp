@@ -15,9 +15,9 @@ constexpr int kMostBands = 12;
 constexpr int kCells = 10;  // of a band, one feature each
 constexpr int kPatch = 8;   // shrunk px
 constexpr int kPatchPixels = kPatch * kPatch;
-// Sum of the steps along the row over a patch below which there is nothing to follow: 6 grey levels a pixel,
+// Sum of the steps along the row over a patch below which there is nothing to follow: 4 grey levels a pixel,
 // where noise of 2 levels has 1.
-constexpr int kLeastSteps = kPatchPixels * 6;
+constexpr int kLeastSteps = kPatchPixels * 4;
 // Correlation of a match, and by how much all others (2 px and more away) must be further from 1: on 25 real
 // sets at most 2 of 100 such matches are wrong.
 constexpr double kLeastMatch = 0.85;
