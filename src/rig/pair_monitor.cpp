@@ -19,7 +19,7 @@ constexpr int kPatchPixels = kPatch * kPatch;
 // where noise of 2 levels has 1.
 constexpr int kLeastSteps = kPatchPixels * 4;
 // Correlation of a match, and by how much all others (2 px and more away) must be further from 1: on 25 real
-// sets at most 2 of 100 such matches are wrong.
+// sets at most 3 of 100 such matches are wrong.
 constexpr double kLeastMatch = 0.85;
 constexpr double kUnique = 2.0;
 constexpr double kLeastMargin = 0.02;  // and by this, where the best is perfect: the posts of a fence
@@ -190,7 +190,7 @@ PairMonitor::PairMonitor(const RectifiedRig& rig, int min_disparity, int dispari
       excluded_left_(excluded_left),
       excluded_right_(excluded_right),
       features_(arena.take<Feature>(static_cast<std::size_t>(kMostBands * kCells))),
-      by_place_(arena.take<const Feature*>(static_cast<std::size_t>(kMostBands * kCells))),
+      placed_(arena.take<std::size_t>(static_cast<std::size_t>(kMostBands * kCells))),
       sorted_(arena.take<double>(static_cast<std::size_t>(kMostBands * kCells))) {}
 
 bool PairMonitor::is_free(ConstImageView<std::uint8_t> excluded, int x, int y, int reach) const {
@@ -446,13 +446,13 @@ double PairMonitor::median(std::size_t count) {
 // Median over pairs of features of different brightness of how many times their difference the left view has.
 double PairMonitor::gain_of_features(double otherwise) {
     std::size_t placed = 0;
-    for (const Feature& feature : features_)
-        if (feature.placed) by_place_[placed++] = &feature;
+    for (std::size_t i = 0; i < features_.size(); ++i)
+        if (features_[i].placed) placed_[placed++] = i;
     std::size_t count = 0;
     for (std::size_t i = 0; i < placed; ++i) {
         // A third of all features on: somewhere else in the picture.
-        const Feature& one = *by_place_[i];
-        const Feature& other = *by_place_[(i + placed / 3) % placed];
+        const Feature& one = features_[placed_[i]];
+        const Feature& other = features_[placed_[(i + placed / 3) % placed]];
         const double in_right = one.mean_right - other.mean_right;
         if (std::abs(in_right) < kLeastSpread) continue;
         sorted_[count++] = (one.mean_left - other.mean_left) / in_right;

@@ -65,7 +65,7 @@ class PairMonitor {
     ConstImageView<std::uint8_t> excluded_left_;
     ConstImageView<std::uint8_t> excluded_right_;
     std::span<Feature> features_;
-    std::span<const Feature*> by_place_;
+    std::span<std::size_t> placed_;  // of the features, in their order
     std::span<double> sorted_;
 };
 

@@ -44,8 +44,8 @@ struct Limits {
     double min_contrast = 10.0;                       // grey levels; noise of 2 levels alone spans 7
     // Pairs of one bit pattern in a row; the next is the third.
     int max_same_pairs = 2;
-    // Of the features that are clearly nearer than infinity or beyond it. Not exchanged: up to 4 of 100 on 25
-    // real sets; exchanged: 58 of 100 where the principal points are 31 px apart, else 95 and more.
+    // Of the features that are clearly nearer than infinity or beyond it. Not exchanged: up to 3 of 100 on 25
+    // real sets; exchanged: 63 of 100 where the principal points are 31 px apart, else 95 and more.
     double max_behind_share = 0.35;
     int min_features = 6;
     // Vertical offset, by what is sure of it: two deviations of the median less. At 0.4 px a matcher of whole
