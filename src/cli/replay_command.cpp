@@ -15,7 +15,6 @@
 #include "cli/run_setup.hpp"
 #include "core/clock.hpp"
 #include "core/error.hpp"
-#include "io/body_mask.hpp"
 #include "io/calibration/calibration_reader.hpp"
 #include "io/result_writer.hpp"
 #include "pipeline/worker_pool.hpp"
@@ -110,10 +109,8 @@ int run_replay(const ReplayOptions& options) {
     if (options.out) writer.emplace(*options.out, counters);
     const int processors = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
     pipeline::WorkerPool pool(options.threads > 0 ? options.threads : processors);
-    pipeline::ProcessorConfig config = processor_config(settings, info.colour && writer.has_value());
-    config.live = info.live;
-    config.body = io::read_body_mask(settings.mount.body_mask, info.width, info.height, arena);
-    pipeline::Processor processor(config, rectifier, pool, arena);
+    pipeline::Processor processor(processor_config(settings, info, info.colour && writer.has_value(), arena),
+                                  rectifier, pool, arena);
     RunStatistics statistics;
     std::vector<pipeline::SinkSlot> sinks{{&statistics, std::nullopt, true}};
     std::optional<publish::LcmPublisher> publisher;

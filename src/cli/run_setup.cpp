@@ -1,5 +1,6 @@
 #include "cli/run_setup.hpp"
 
+#include "io/body_mask.hpp"
 #include "rig/range.hpp"
 
 namespace groundline::cli {
@@ -33,13 +34,16 @@ void choose_disparities(int width, int hint, settings::Settings& settings) {
     if (settings.auto_disparities) settings.matcher.disparities = rig::auto_disparities(width, hint);
 }
 
-pipeline::ProcessorConfig processor_config(const settings::Settings& settings, bool colour) {
+pipeline::ProcessorConfig processor_config(const settings::Settings& settings, const SourceInfo& source,
+                                           bool colour, Arena& arena) {
     pipeline::ProcessorConfig config;
     config.matcher = settings.matcher;
     config.terrain = settings::terrain_config(settings);
     config.grid = settings.grid;
     config.limits = settings::verdict_limits(settings);
     config.colour = colour;
+    config.live = source.live;
+    config.body = io::read_body_mask(settings.mount.body_mask, source.width, source.height, arena);
     return config;
 }
 

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "core/arena.hpp"
+#include "core/frame_source.hpp"
 #include "core/rectified_rig.hpp"
 #include "pipeline/processor.hpp"
 #include "rig/calibration.hpp"
@@ -21,7 +23,9 @@ rig::StereoCalibration calibration_of(const RectifiedRig& rig);
 // Fills in the number of disparities where it is left to the picture; `hint` as rig::auto_disparities().
 void choose_disparities(int width, int hint, settings::Settings& settings);
 
-// Throws Refusal(kConfig) as settings::terrain_config() does.
-pipeline::ProcessorConfig processor_config(const settings::Settings& settings, bool colour);
+// For pairs of that source; `colour`: it has colour and something draws it. The mask of the robot's own parts
+// is read into the arena. Throws Refusal(kConfig) as settings::terrain_config() and io::read_body_mask() do.
+pipeline::ProcessorConfig processor_config(const settings::Settings& settings, const SourceInfo& source,
+                                           bool colour, Arena& arena);
 
 }  // namespace groundline::cli

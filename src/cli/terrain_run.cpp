@@ -28,9 +28,10 @@ namespace fs = std::filesystem;
 // A processor for judging and, so that times are those of warm memory, another of which they are taken.
 class Ours {
   public:
-    Ours(const settings::Settings& settings, bool live, const rig::Rectifier& rectifier)
-        : judged_(config_of(settings, live), rectifier, serial_, arena_),
-          timed_(config_of(settings, false), rectifier, serial_, arena_),
+    Ours(const settings::Settings& settings, const SourceInfo& source, const rig::Rectifier& rectifier)
+        : config_(processor_config(settings, source, false, arena_)),
+          judged_(config_, rectifier, serial_, arena_),
+          timed_(config_, rectifier, serial_, arena_),
           result_(judged_.make_result(arena_)),
           timed_result_(judged_.make_result(arena_)) {}
 
@@ -46,14 +47,9 @@ class Ours {
     }
 
   private:
-    static pipeline::ProcessorConfig config_of(const settings::Settings& settings, bool live) {
-        pipeline::ProcessorConfig config = processor_config(settings, false);
-        config.live = live;
-        return config;
-    }
-
     Arena arena_;
     Serial serial_;
+    pipeline::ProcessorConfig config_;
     pipeline::Processor judged_;
     pipeline::Processor timed_;
     FrameResult result_;
@@ -81,9 +77,9 @@ std::int64_t at(const StageTimes& times, Stage stage) {
 // Both methods for pictures of one rig.
 class Judge {
   public:
-    Judge(const settings::Settings& settings, bool live, const rig::Rectifier& rectifier)
+    Judge(const settings::Settings& settings, const SourceInfo& source, const rig::Rectifier& rectifier)
         : rectifier_(rectifier),
-          ours_(settings, live, rectifier),
+          ours_(settings, source, rectifier),
           baseline_(rectifier.rig(), settings.matcher.min_disparity, settings.matcher.disparities,
                     settings.terrain.tolerance_up_m),
           mask_(arena_.image<TerrainClass>(rectifier.rig().width, rectifier.rig().height)),
@@ -183,7 +179,7 @@ class SetJudge {
         rectifier_ = std::make_unique<rig::Rectifier>(calibration, info.width, info.height, arena_);
         settings::Settings chosen = settings;
         choose_disparities(info.width, calibration.disparities_hint, chosen);
-        judge_ = std::make_unique<Judge>(chosen, false, *rectifier_);
+        judge_ = std::make_unique<Judge>(chosen, info, *rectifier_);
         frame_ = StereoFrame::make(arena_, info.width, info.height, info.colour);
         seen_ = arena_.image<TerrainClass>(info.width, info.height);
         all_ = arena_.image<TerrainClass>(info.width, info.height);
@@ -298,7 +294,11 @@ JudgedUnit judge_rendered(const SuiteFrame& asked, const settings::Settings& set
     if (dug) truth.ditch_lip_m = scene.trenches.front().near_m;
 
     const bool frozen = asked.picture == Picture::kFrozen;
-    Judge both(chosen, frozen, rectifier);
+    SourceInfo source;
+    source.width = scene.rig.width;
+    source.height = scene.rig.height;
+    source.live = frozen;
+    Judge both(chosen, source, rectifier);
     both.run(frame);
     for (int i = 1; frozen && i < kFrozenPairs; ++i) {
         ++frame.stamp.sequence;

@@ -681,6 +681,11 @@ TEST_F(TerrainTable, ConfigurationReachesBothMethods) {
     const json high = json::parse(out_);
     for (const char* method : {"groundline", "baseline"})
         EXPECT_LT(high["all"][method]["obstacle_recall"], usual["all"][method]["obstacle_recall"]) << method;
+    options.set = {"mount.body_mask=0,200 319,200 319,239 0,239"};
+    ASSERT_EQ(run(options), 0) << sentence_ << err_;
+    const json body = json::parse(out_);
+    EXPECT_LT(body["all"]["groundline"]["ground_known"], usual["all"]["groundline"]["ground_known"]);
+    EXPECT_EQ(body["all"]["baseline"], usual["all"]["baseline"]) << "which has no such mask";
     options.set = {"terrain.tolerance=0.5"};
     EXPECT_EQ(run(options), 78);
 }
