@@ -122,7 +122,7 @@ void Processor::process(const StereoFrame& frame, FrameResult& result) {
     result.ground = decision.ground;
     clock.end(Stage::kGround);
 
-    classifier_.classify(result.disparity, result.ground, decision.use, ground_finder_.supported_rows(),
+    classifier_.classify(result.disparity, result.ground, decision.use, ground_finder_.surface(),
                          result.mask, result.obstacles, result.range_limit_m, parallel_);
     sector_finder_.find(result.disparity, result.ground, result.mask, result.sectors);
     if (elevation_grid_) elevation_grid_->find(result.disparity, result.ground, result.mask, result.grid);

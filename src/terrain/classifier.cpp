@@ -48,6 +48,7 @@ Classifier::Classifier(const TerrainConfig& config, const RectifiedRig& rig, int
       disparities_(disparities),
       certified_q4_(arena.take<std::int32_t>(static_cast<std::size_t>(rig.width))) {
     components_.take(arena, rig.width, rig.height, min_disparity, disparities, config.min_pixels);
+    outline_.take(arena, rig.width, rig.height);
 }
 
 Classifier::Wedge Classifier::wedge_of(const Ground& ground) const {
@@ -134,10 +135,10 @@ double Classifier::certify_columns(const Wedge& wedge) {
 
 // A pixel farther than its column is certified for: sigma_H^2 = ((h - H)/d)^2 sigma_d^2 + J C J' at the pixel
 // itself, all over h^2.
-TerrainClass Classifier::beyond_range(const Wedge& wedge, int u, int v, double d_px) const {
+TerrainClass Classifier::beyond_range(const Wedge& wedge, int u, int v, double d_px, double rise) const {
     const double ground_px = wedge.ground.at(u, v);
     const double inverse = 1.0 / d_px;
-    const double ratio = 1.0 - ground_px * inverse;
+    const double ratio = 1.0 - ground_px * inverse - rise;
     if (!(ratio > wedge.ratio_up)) return TerrainClass::kUnknown;
     const double by[3] = {ratio * wedge.height_by[0] - u * inverse, ratio * wedge.height_by[1] - v * inverse,
                           ratio * wedge.height_by[2] - inverse};
@@ -150,15 +151,11 @@ TerrainClass Classifier::beyond_range(const Wedge& wedge, int u, int v, double d
     return stands ? TerrainClass::kObstacle : TerrainClass::kUnknown;
 }
 
-void Classifier::classify_row(ConstDisparityMap map, const Wedge& wedge, GroundUse use, RowSupport support,
-                              int v, Mask out) const {
+void Classifier::classify_row(ConstDisparityMap map, const Wedge& wedge, GroundUse use,
+                              const GroundSurface& surface, int v, Mask out) const {
     const std::int16_t* disparity = map.disparity_q4.row(v);
     const Invalid* invalid = map.invalid.row(v);
     TerrainClass* kinds = out.row(v);
-    const TerrainClass level = (use == GroundUse::kOwn && support != RowSupport::kContradicted) ||
-                                       (use == GroundUse::kWeak && support == RowSupport::kSupported)
-                                   ? TerrainClass::kTraversable
-                                   : TerrainClass::kUnknown;
     const std::int64_t last_q40 = fixed((last_disparity_ - 1 - wedge.offset_px) * kDisparityOne, 2 * kBits);
     std::int64_t ground_q40 = wedge.dv_q40 * v + wedge.d0_q40;
     for (int u = 0; u < map.width(); ++u, ground_q40 += wedge.du_q40) {
@@ -171,26 +168,39 @@ void Classifier::classify_row(ConstDisparityMap map, const Wedge& wedge, GroundU
         const std::int64_t d_q20 = (std::int64_t{disparity[u]} << kBits) - wedge.offset_q20;
         if (d_q20 <= 0) {  // at infinity or behind it
             kinds[u] = TerrainClass::kUnknown;
-        } else if (wedge.band) {
+            continue;
+        }
+        TerrainClass level = TerrainClass::kUnknown;
+        if (use == GroundUse::kOwn || use == GroundUse::kWeak) {
+            const CellSupport support = surface.support(disparity[u], u);
+            const bool enough = use == GroundUse::kOwn ? support != CellSupport::kContradicted
+                                                       : support == CellSupport::kSupported;
+            if (enough) level = TerrainClass::kTraversable;
+        }
+        if (wedge.band) {
             const std::int64_t above = (d_q20 << kBits) - ground_q40;
             const bool usable = ground_q40 > 0 && d_q20 >= (std::int64_t{kDisparityOne} << kBits);
             kinds[u] = above > wedge.band_q40    ? TerrainClass::kObstacle
                        : above < -wedge.band_q40 ? TerrainClass::kDrop
                        : usable                  ? level
                                                  : TerrainClass::kUnknown;
-        } else if (disparity[u] < certified_q4_[static_cast<std::size_t>(u)]) {
+            continue;
+        }
+        const double rise = use == GroundUse::kHeld ? 0.0 : surface.rise_at(disparity[u], u);
+        if (disparity[u] < certified_q4_[static_cast<std::size_t>(u)]) {
             const double d_px = disparity[u] * (1.0 / kDisparityOne) - wedge.offset_px;
-            kinds[u] = beyond_range(wedge, u, v, d_px);
+            kinds[u] = beyond_range(wedge, u, v, d_px, rise);
         } else {
-            kinds[u] = wedge.factor_up * d_q20 > ground_q40     ? TerrainClass::kObstacle
-                       : wedge.factor_down * d_q20 < ground_q40 ? TerrainClass::kDrop
-                                                                : level;
+            const std::int64_t shift = fixed(rise, kBits);
+            kinds[u] = (wedge.factor_up - shift) * d_q20 > ground_q40     ? TerrainClass::kObstacle
+                       : (wedge.factor_down - shift) * d_q20 < ground_q40 ? TerrainClass::kDrop
+                                                                          : level;
         }
     }
 }
 
 void Classifier::classify(ConstDisparityMap map, const Ground& ground, GroundUse use,
-                          std::span<const RowSupport> supported_rows, Mask out,
+                          const GroundSurface& surface, Mask out,
                           FixedVector<Obstacle, kMaxObstacles>& obstacles, double& range_limit_m,
                           Parallel& parallel) {
     assert(map.width() == rig_.width && map.height() == rig_.height &&
@@ -210,9 +220,7 @@ void Classifier::classify(ConstDisparityMap map, const Ground& ground, GroundUse
     const int tasks = (map.height() + kRowsPerTask - 1) / kRowsPerTask;
     parallel.for_each(tasks, [&](int task, int) {
         for (int v = task * kRowsPerTask; v < std::min(map.height(), (task + 1) * kRowsPerTask); ++v) {
-            const auto row = static_cast<std::size_t>(v);
-            const RowSupport support = row < supported_rows.size() ? supported_rows[row] : RowSupport::kNone;
-            classify_row(map, wedge, use, support, v, out);
+            classify_row(map, wedge, use, surface, v, out);
         }
     });
 
@@ -228,6 +236,7 @@ void Classifier::classify(ConstDisparityMap map, const Ground& ground, GroundUse
     rules.min_pixels = config_.min_pixels;
     rules.range_edge_q4 = last_disparity_ * kDisparityOne;
     components_.find(map, rules, out, things_);
+    outline_.apply(config_.gap_px, config_.blur_px, map.invalid, out);
 
     for (const Thing& thing : things_) {
         Obstacle obstacle;

@@ -15,7 +15,8 @@
 #include "core/terrain_class.hpp"
 #include "terrain/components.hpp"
 #include "terrain/config.hpp"
-#include "terrain/row_support.hpp"
+#include "terrain/ground_surface.hpp"
+#include "terrain/outline.hpp"
 
 namespace groundline::terrain {
 
@@ -45,18 +46,18 @@ class Classifier {
     // A ground with found == false counts as kNone. `supported_rows` has one entry per row:
     // contradicted rows are never class 1, others in kWeak only where supported.
     // range_limit_m is the farthest r where class 1 is possible, 0 where it is not or without metres.
-    void classify(ConstDisparityMap map, const Ground& ground, GroundUse use,
-                  std::span<const RowSupport> supported_rows, Mask out,
-                  FixedVector<Obstacle, kMaxObstacles>& obstacles, double& range_limit_m, Parallel& parallel);
+    void classify(ConstDisparityMap map, const Ground& ground, GroundUse use, const GroundSurface& surface,
+                  Mask out, FixedVector<Obstacle, kMaxObstacles>& obstacles, double& range_limit_m,
+                  Parallel& parallel);
 
   private:
     struct Wedge;
 
     Wedge wedge_of(const Ground& ground) const;
     double certify_columns(const Wedge& wedge);
-    void classify_row(ConstDisparityMap map, const Wedge& wedge, GroundUse use, RowSupport support, int v,
-                      Mask out) const;
-    TerrainClass beyond_range(const Wedge& wedge, int u, int v, double d_px) const;
+    void classify_row(ConstDisparityMap map, const Wedge& wedge, GroundUse use, const GroundSurface& surface,
+                      int v, Mask out) const;
+    TerrainClass beyond_range(const Wedge& wedge, int u, int v, double d_px, double rise) const;
 
     TerrainConfig config_;
     RectifiedRig rig_;
@@ -64,6 +65,7 @@ class Classifier {
     int disparities_;
     std::span<std::int32_t> certified_q4_;  // per column, the least measured disparity within its range
     Components components_;
+    Outline outline_;
     FixedVector<Thing, kMaxObstacles> things_;
 };
 

@@ -63,6 +63,11 @@ struct TerrainConfig {
     double sigmas = 3.0;
     // Least visible area of a thing: 0.1 m x 0.1 m of which 30 % matched.
     double min_area_m2 = 0.003;
+    // Unmatched gaps up to twice this many px inside obstacles are obstacle: leaves, mesh and shadow leave
+    // them.
+    int gap_px = 8;
+    // Ground nearer than this to an obstacle or a drop is unknown: the windows that match it see both.
+    int blur_px = 4;
     // Fewest pixels of a thing at any range; chance clusters of 5 % outliers stay below 8.
     int min_pixels = 12;
 };

@@ -55,6 +55,7 @@ GroundFinder::GroundFinder(const TerrainConfig& config, const RectifiedRig& rig,
     hough_.take(arena,
                 static_cast<int>((rig.height + std::max(0.0, -line_gate_.horizon_first)) / row_step_) + 2);
     plane_fit_.take(arena, rig.width, rig.height);
+    surface_.take(arena, rig.width, rig.height, min_disparity, disparities);
     tally_ = arena.take<RowTally>(static_cast<std::size_t>(rig.height));
     supported_rows_ = arena.take<RowSupport>(static_cast<std::size_t>(rig.height));
     column_mass_ = arena.take<std::uint32_t>(static_cast<std::size_t>(disparities) * 4 + 1);
@@ -148,10 +149,12 @@ bool GroundFinder::fit(ConstDisparityMap map, const VDisparity& v_disparity, con
         start.d0 = -line.slope * (centre_u_ * tangent + line.horizon_row) + offset_px_;
         planes[static_cast<std::size_t>(index)] = plane_fit_.converge(start, 5.0);
     });
+    // Nothing lies beneath the ground that the robot stands on.
+    const auto worth = [](const PlaneFitResult& plane) { return plane.weight - plane.beneath; };
     const auto better = [&](const PlaneFitResult& a, const PlaneFitResult& b) {
         const bool a_inside = a.found && inside(a.plane, gate);
         const bool b_inside = b.found && inside(b.plane, gate);
-        return a_inside != b_inside ? a_inside : a.found && (!b.found || a.weight > b.weight);
+        return a_inside != b_inside ? a_inside : a.found && (!b.found || worth(a) > worth(b));
     };
     PlaneFitResult strongest;
     for (const PlaneFitResult& plane : planes)
@@ -175,7 +178,7 @@ bool GroundFinder::fit(ConstDisparityMap map, const VDisparity& v_disparity, con
         const PlaneFitResult before = strongest;
         for (const PlaneFitResult& plane : about)
             if (better(plane, strongest)) strongest = plane;
-        if (strongest.weight <= 1.01 * before.weight) break;
+        if (worth(strongest) <= worth(before) + 0.01 * before.weight) break;
     }
     // A rival counts by what it alone explains: a steeper plane through the same pixels is no second ground.
     second_ratio = 0.0;
@@ -185,6 +188,24 @@ bool GroundFinder::fit(ConstDisparityMap map, const VDisparity& v_disparity, con
                                     plane_fit_.own_weight(plane.plane, strongest.plane) / strongest.weight);
     best = plane_fit_.fit(map, strongest.plane, parallel);
     return best.found;
+}
+
+// Ground with waves: the plane is levelled by the profile found about it, and the profile found anew.
+void GroundFinder::shape(ConstDisparityMap map, DisparityPlane& plane, Parallel& parallel) {
+    constexpr int kRounds = 3;
+    const double focal = rig_.calibrated ? rig_.focal_px : 1.0 * rig_.width;
+    for (int round = 0; round <= kRounds; ++round) {
+        surface_.find(map, plane, offset_px_, focal, tolerance_share(plane), parallel);
+        if (surface_.flat() || round == kRounds) break;
+        plane = surface_.levelled(plane, offset_px_);
+    }
+    surface_.settle(plane.dv);
+}
+
+// The tolerance over the camera's height.
+double GroundFinder::tolerance_share(const DisparityPlane& plane) const {
+    if (!rig_.calibrated) return config_.tolerance_ratio;
+    return std::min(config_.tolerance_up_m, config_.tolerance_down_m) / pose_of(plane, rig_).height_m;
 }
 
 void GroundFinder::tally(ConstDisparityMap map, const DisparityPlane& plane, Parallel& parallel) {
@@ -204,10 +225,17 @@ void GroundFinder::tally(ConstDisparityMap map, const DisparityPlane& plane, Par
                 ++row.below;
                 if (!valid) continue;
                 ++row.valid;
-                const double residual = disparity[u] * (1.0 / kDisparityOne) - expected;
+                double residual = disparity[u] * (1.0 / kDisparityOne) - expected;
+                if (!surface_.flat()) {
+                    const double rise = surface_.rise_at(disparity[u], u);
+                    residual -= rise / (1.0 - rise) * (expected - offset_px_);
+                }
                 const double size = std::fabs(residual);
                 const double most = reach_px(kResidualPx, expected - offset_px_);
-                if (size >= most) continue;
+                if (size >= most) {
+                    row.standing += residual > 0.0 ? 1 : 0;
+                    continue;
+                }
                 row.near += size <= kNearPx ? 1 : 0;
                 if (size <= kInlierPx) {
                     ++row.inliers;
@@ -237,10 +265,7 @@ int GroundFinder::support_rows(const DisparityPlane& plane) {
     const int gap = std::max(2, height / 40);
     // Height off the plane, over the camera's, that a level row may have. If no row is farther off than half
     // the tolerance, no two floors differ by more than the tolerance.
-    const double tolerance = rig_.calibrated ? std::min(config_.tolerance_up_m, config_.tolerance_down_m) /
-                                                   pose_of(plane, rig_).height_m
-                                             : config_.tolerance_ratio;
-    const double off = kRowOffShare * tolerance;
+    const double off = kRowOffShare * tolerance_share(plane);
     int longest = 0;
     int run_start = -1;
     int last_supported = -1;
@@ -323,6 +348,7 @@ void GroundFinder::find(ConstDisparityMap map, VDisparity& v_disparity, Parallel
                         const GroundPose* prior, GroundEvidence& evidence, Ground& ground) {
     evidence = {};
     ground = {};
+    surface_.flatten();
     build_v_disparity(map, v_disparity, parallel);
     const Gate gate = gate_for(prior);
     set_line_gate(gate);
@@ -333,11 +359,12 @@ void GroundFinder::find(ConstDisparityMap map, VDisparity& v_disparity, Parallel
     // Without a plane the tallies are of the lower half: a plane that is 1 px there and below.
     DisparityPlane plane = fitted.plane;
     if (!has_plane) plane = {0.0, 1.0, 1.0 + offset_px_ - 0.5 * rig_.height};
+    if (has_plane) shape(map, plane, parallel);
     tally(map, plane, parallel);
 
     const int height = map.height();
     const int lower_third = height - height / 3;
-    double below = 0, valid = 0, inliers = 0, blocked = 0, square = 0;
+    double below = 0, valid = 0, standing = 0, inliers = 0, blocked = 0, square = 0;
     double row_residuals = 0.0;
     int rows_with_residual = 0;
     int rows_below = 0;
@@ -346,6 +373,7 @@ void GroundFinder::find(ConstDisparityMap map, VDisparity& v_disparity, Parallel
         const RowTally& row = tally_[static_cast<std::size_t>(v)];
         below += row.below;
         valid += row.valid;
+        standing += row.standing;
         inliers += row.inliers;
         if (v >= lower_third) blocked += row.blocked;
         square += row.square;
@@ -366,7 +394,7 @@ void GroundFinder::find(ConstDisparityMap map, VDisparity& v_disparity, Parallel
         evidence.wall = valid > 0 && upright > 0.5 * kTallyStep * valid;
         return;
     }
-    evidence.inlier_share = valid > 0 ? inliers / valid : 0.0;
+    evidence.inlier_share = valid > standing ? inliers / (valid - standing) : 0.0;
     evidence.line_run_share =
         rows_below > 0 ? std::min(1.0, static_cast<double>(support_rows(plane)) / rows_below) : 0.0;
     evidence.second_peak_ratio = second_ratio;
@@ -376,7 +404,7 @@ void GroundFinder::find(ConstDisparityMap map, VDisparity& v_disparity, Parallel
     evidence.wall = leans(plane) || upright > kTallyStep * inliers;
     // Twice what pixels spread evenly over the search range would put on any plane.
     const double least_share = std::max(0.1, std::min(0.5, 2.0 * chance(kInlierPx)));
-    evidence.line_found = evidence.inlier_share >= least_share && evidence.line_run_share >= 0.1;
+    evidence.line_found = inliers >= least_share * valid && evidence.line_run_share >= 0.1;
     ground.found = evidence.line_found && evidence.inside_gate && !evidence.wall;
     if (!ground.found) {
         std::fill(supported_rows_.begin(), supported_rows_.end(), RowSupport::kNone);

@@ -13,6 +13,7 @@
 #include "core/rectified_rig.hpp"
 #include "core/result.hpp"
 #include "terrain/config.hpp"
+#include "terrain/ground_surface.hpp"
 #include "terrain/hough.hpp"
 #include "terrain/plane_fit.hpp"
 #include "terrain/row_support.hpp"
@@ -45,23 +46,27 @@ class GroundFinder {
     // on end nearer by or just beyond: then one plane lies between two floors and what is farther may be on
     // the other. None everywhere where no ground was found.
     std::span<const RowSupport> supported_rows() const { return supported_rows_; }
+    const GroundSurface& surface() const { return surface_; }
 
   private:
     struct RowTally {
-        std::int32_t below = 0;    // sampled pixels below the horizon
-        std::int32_t valid = 0;    // of these, with a disparity
-        std::int32_t near = 0;     // of these, within 1 px of the ground
-        std::int32_t inliers = 0;  // within 1.5 px
-        std::int32_t blocked = 0;  // invalid pixels of the whole row
-        double square = 0.0;       // of the inliers' residuals
-        double weight = 0.0;       // Tukey weights at 3 px
-        double residual = 0.0;     // weighted sum
+        std::int32_t below = 0;     // sampled pixels below the horizon
+        std::int32_t valid = 0;     // of these, with a disparity
+        std::int32_t near = 0;      // of these, within 1 px of the ground
+        std::int32_t standing = 0;  // too far above the ground to take part
+        std::int32_t inliers = 0;   // within 1.5 px
+        std::int32_t blocked = 0;   // invalid pixels of the whole row
+        double square = 0.0;        // of the inliers' residuals
+        double weight = 0.0;        // Tukey weights at 3 px
+        double residual = 0.0;      // weighted sum
     };
 
     Gate gate_for(const GroundPose* prior) const;
     void set_line_gate(const Gate& gate);
     bool fit(ConstDisparityMap map, const VDisparity& v_disparity, const Gate& gate, Parallel& parallel,
              PlaneFitResult& best, double& second_ratio);
+    void shape(ConstDisparityMap map, DisparityPlane& plane, Parallel& parallel);
+    double tolerance_share(const DisparityPlane& plane) const;
     void tally(ConstDisparityMap map, const DisparityPlane& plane, Parallel& parallel);
     int support_rows(const DisparityPlane& plane);
     bool inside(const DisparityPlane& plane, const Gate& gate) const;
@@ -80,6 +85,7 @@ class GroundFinder {
     LineGate line_gate_;
     Hough hough_;
     PlaneFit plane_fit_;
+    GroundSurface surface_;
     std::span<RowTally> tally_;
     std::span<RowSupport> supported_rows_;
     std::span<std::uint32_t> column_mass_;

@@ -17,6 +17,8 @@ constexpr int kTile = 32;       // px, wider than any matching window's reach
 constexpr double kCommonErrorPx = 0.09;
 constexpr double kTiltUErrorPx = 0.02;
 constexpr double kTiltVErrorPx = 0.08;
+// A pixel is near the camera where the ground has this share of its disparity in the middle of the last row.
+constexpr double kNearShare = 0.4;
 constexpr double kLastTolerancePx = 1.5;  // at which converge() and fit() end
 
 // Symmetric 3 x 3, row-major; false where it is singular for practical purposes.
@@ -128,6 +130,12 @@ PlaneFitResult PlaneFit::converge(const DisparityPlane& start, double first_tole
     }
     result.plane = plane;
     result.found = true;
+    const double near_px = kNearShare * (plane.at(0.5 * width_, height_ - 1.0) - offset_px_);
+    for (std::size_t i = 0; i < samples_used_; ++i) {
+        const double expected = plane.at(samples_[i].u, samples_[i].v);
+        const bool near = expected - offset_px_ >= near_px;
+        result.beneath += near && samples_[i].d_px < expected - kLastTolerancePx ? 1.0 : 0.0;
+    }
     return result;
 }
 

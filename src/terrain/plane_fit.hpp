@@ -17,13 +17,14 @@ struct PlaneFitResult {
     DisparityPlane plane;                // of measured disparity
     std::array<double, 9> covariance{};  // of (du, dv, d0)
     double weight = 0.0;                 // sum of the weights, about the number of samples on the plane
+    double beneath = 0.0;                // of converge(): samples that lie beneath it near the camera
 };
 
 // How far from the ground a pixel may lie to take part, where the ground's true disparity is ground_px: the
 // tolerance, but never more than half a pixel and a quarter of that disparity, so that far away a thing of a
 // few decimetres is not taken for ground.
 inline double reach_px(double tolerance_px, double ground_px) {
-    return std::min(tolerance_px, 0.5 + 0.25 * ground_px);
+    return std::min(std::max(tolerance_px, std::min(4.0, 0.08 * ground_px)), 0.5 + 0.25 * ground_px);
 }
 
 // Iteratively reweighted least squares with Tukey weights, in two steps: converge() brings any number of

@@ -83,6 +83,7 @@ void SectorFinder::count_things(ConstDisparityMap map, const View& view, ConstMa
         int sector = 0;
         for (int u = 0; u < mask.width; ++u) {
             if (kinds[u] != TerrainClass::kObstacle && kinds[u] != TerrainClass::kDrop) continue;
+            if (invalid[u] != Invalid::kNone && invalid[u] != Invalid::kRangeEdge) continue;
             const double measured_px =
                 invalid[u] == Invalid::kRangeEdge ? last_disparity_ : disparity[u] * (1.0 / kDisparityOne);
             const double depth = view.scale / std::max(measured_px - view.offset_px, 1.0 / kDisparityOne);

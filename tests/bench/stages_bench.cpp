@@ -65,7 +65,7 @@ void classes_and_sectors(benchmark::State& state) {
     FixedVector<Sector, kMaxSectors> sectors;
     double range_limit_m = 0.0;
     for (auto _ : state) {
-        classifier.classify(given.map, found, terrain::GroundUse::kOwn, finder.supported_rows(), mask,
+        classifier.classify(given.map, found, terrain::GroundUse::kOwn, finder.surface(), mask,
                             obstacles, range_limit_m, given.serial);
         sector_finder.find(given.map, found, mask, sectors);
     }

@@ -36,7 +36,7 @@ struct Bench {
     Classifier classifier;
     DisparityMap map;
     ImageView<TerrainClass> mask;
-    std::vector<RowSupport> supported;
+    GroundSurface surface;
     FixedVector<Obstacle, kMaxObstacles> obstacles;
     double range_limit_m = -1.0;
 
@@ -44,11 +44,13 @@ struct Bench {
         : rig(r),
           classifier(config, rig, 0, disparities, arena),
           map(DisparityMap::make(arena, rig.width, rig.height)),
-          mask(arena.image<TerrainClass>(rig.width, rig.height)),
-          supported(static_cast<std::size_t>(rig.height), RowSupport::kSupported) {}
+          mask(arena.image<TerrainClass>(rig.width, rig.height)) {
+        surface.take(arena, rig.width, rig.height, 0, disparities);
+        surface.flatten(CellSupport::kSupported);
+    }
     void classify(const Ground& ground, GroundUse use = GroundUse::kOwn) {
         Serial serial;
-        classifier.classify(map, ground, use, supported, mask, obstacles, range_limit_m, serial);
+        classifier.classify(map, ground, use, surface, mask, obstacles, range_limit_m, serial);
     }
     int count(TerrainClass kind) const {
         int pixels = 0;
@@ -72,6 +74,8 @@ TerrainConfig unfiltered() {
     config.min_pixels = 1;
     config.min_area_m2 = 0.0;
     config.clearance_m = 1e9;
+    config.gap_px = 0;
+    config.blur_px = 0;
     return config;
 }
 
@@ -286,21 +290,16 @@ TEST(Classifier, WhatTheGroundIsWorthDecidesWhatMayBeTraversable) {
     EXPECT_EQ(bench.count(TerrainClass::kDrop), drops);
     EXPECT_EQ(bench.range_limit_m, 0.0);
 
-    for (int v = 0; v < rig.height; ++v)
-        bench.supported[static_cast<std::size_t>(v)] =
-            v % 3 == 0 ? RowSupport::kSupported : RowSupport::kNone;
+    bench.classify(ground, GroundUse::kWeak);
+    EXPECT_EQ(bench.pixels(), own);
+    bench.surface.flatten(CellSupport::kNone);
     bench.classify(ground, GroundUse::kWeak);
     const std::vector<TerrainClass> weak = bench.pixels();
-    for (int v = 0; v < rig.height; ++v)
-        for (int u = 0; u < rig.width; ++u) {
-            const auto at = static_cast<std::size_t>(v * rig.width + u);
-            const bool hidden = own[at] == TerrainClass::kTraversable && v % 3 != 0;
-            EXPECT_EQ(weak[at], hidden ? TerrainClass::kUnknown : own[at]);
-        }
-
+    for (std::size_t i = 0; i < own.size(); ++i)
+        EXPECT_EQ(weak[i], own[i] == TerrainClass::kTraversable ? TerrainClass::kUnknown : own[i]);
     bench.classify(ground, GroundUse::kOwn);
     EXPECT_EQ(bench.pixels(), own);
-    bench.supported.assign(bench.supported.size(), RowSupport::kContradicted);
+    bench.surface.flatten(CellSupport::kContradicted);
     for (const GroundUse use : {GroundUse::kOwn, GroundUse::kWeak}) {
         bench.classify(ground, use);
         EXPECT_EQ(bench.count(TerrainClass::kTraversable), 0);
@@ -518,7 +517,7 @@ TEST(Classifier, IsTheSameForAnyNumberOfLanes) {
     const auto things = bench.obstacles;
     for (const int lanes : {2, 3}) {
         test::Threads threads(lanes);
-        bench.classifier.classify(bench.map, ground, GroundUse::kOwn, bench.supported, bench.mask,
+        bench.classifier.classify(bench.map, ground, GroundUse::kOwn, bench.surface, bench.mask,
                                   bench.obstacles, bench.range_limit_m, threads);
         EXPECT_EQ(bench.pixels(), one);
         ASSERT_EQ(bench.obstacles.size(), things.size());
@@ -569,8 +568,8 @@ TEST(Terrain, AllocatesNothingPerFrame) {
         GroundEvidence evidence;
         Ground ground;
         finder.find(map, v_disparity, serial, nullptr, evidence, ground);
-        classifier.classify(map, ground, GroundUse::kOwn, finder.supported_rows(), mask, obstacles,
-                            range_limit_m, serial);
+        classifier.classify(map, ground, GroundUse::kOwn, finder.surface(), mask, obstacles, range_limit_m,
+                            serial);
         sector_finder.find(map, ground, mask, sectors);
         shares_of(mask, share);
         EXPECT_EQ(test::allocations(), before) << kind;
@@ -598,10 +597,10 @@ TEST(ClassifierStep, FloorBelowAStepIsNotTraversable) {
             Ground ground;
             finder.find(bench.map, v_disparity, serial, nullptr, evidence, ground);
             ASSERT_TRUE(ground.found);
-            bench.supported.assign(finder.supported_rows().begin(), finder.supported_rows().end());
             const test::Rays rays(world);
             for (const GroundUse use : {GroundUse::kOwn, GroundUse::kWeak}) {
-                bench.classify(ground, use);
+                bench.classifier.classify(bench.map, ground, use, finder.surface(), bench.mask,
+                                          bench.obstacles, bench.range_limit_m, serial);
                 int lower = 0;
                 int free = 0;
                 for (int v = 0; v < rig.height; ++v)

@@ -102,10 +102,12 @@ struct Bench {
         test::render(world, 0, kDisparities, {}, map);
         Classifier classifier(config, rig, 0, kDisparities, arena);
         FixedVector<Obstacle, kMaxObstacles> obstacles;
-        const std::vector<RowSupport> rows(static_cast<std::size_t>(rig.height), RowSupport::kSupported);
+        GroundSurface surface;
+        surface.take(arena, rig.width, rig.height, 0, kDisparities);
+        surface.flatten(CellSupport::kSupported);
         double limit_m = 0.0;
         Serial serial;
-        classifier.classify(map, ground, GroundUse::kOwn, rows, mask, obstacles, limit_m, serial);
+        classifier.classify(map, ground, GroundUse::kOwn, surface, mask, obstacles, limit_m, serial);
         find();
     }
     void find() { finder.find(map, ground, mask, grid); }

@@ -22,6 +22,7 @@ struct Bench {
     Arena arena;
     Classifier classifier;
     SectorFinder finder;
+    GroundSurface surface;
     DisparityMap map;
     ImageView<TerrainClass> mask;
     FixedVector<Sector, kMaxSectors> sectors;
@@ -33,7 +34,10 @@ struct Bench {
           classifier(config, rig, 0, kDisparities, arena),
           finder(config, rig, 0, kDisparities, arena),
           map(DisparityMap::make(arena, rig.width, rig.height)),
-          mask(arena.image<TerrainClass>(rig.width, rig.height)) {}
+          mask(arena.image<TerrainClass>(rig.width, rig.height)) {
+        surface.take(arena, rig.width, rig.height, 0, kDisparities);
+        surface.flatten(CellSupport::kSupported);
+    }
     void see(const World& world, const test::Noise& noise = {}) {
         test::render(world, 0, kDisparities, noise, map);
         ground = {};
@@ -41,9 +45,8 @@ struct Bench {
         ground.plane = plane_of(world.pose, rig);
         ground.pose = world.pose;
         FixedVector<Obstacle, kMaxObstacles> obstacles;
-        const std::vector<RowSupport> supported(static_cast<std::size_t>(rig.height), RowSupport::kSupported);
         Serial serial;
-        classifier.classify(map, ground, GroundUse::kOwn, supported, mask, obstacles, range_limit_m, serial);
+        classifier.classify(map, ground, GroundUse::kOwn, surface, mask, obstacles, range_limit_m, serial);
         finder.find(map, ground, mask, sectors);
     }
     const Sector& at(double bearing_rad) const {

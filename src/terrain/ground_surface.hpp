@@ -1,0 +1,95 @@
+// The ground's shape about its plane: waves along the way and banks across it, as far as pixels show them.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "core/arena.hpp"
+#include "core/disparity.hpp"
+#include "core/ground.hpp"
+#include "core/parallel.hpp"
+
+namespace groundline::terrain {
+
+// What this frame's own pixels say about one cell of the ground.
+enum class CellSupport : std::uint8_t {
+    kNone,          // too few pixels lie on it
+    kSupported,     // enough of the cell's pixels lie on it
+    kContradicted,  // what is seen is level, but lies elsewhere
+};
+
+// Heights are shares of the camera's height over the plane, ranges multiples of it, so that both hold without
+// calibration. Cells are steps of disparity (half a pixel, about four rows of ground each) times kBands
+// columns of the picture.
+//
+// Found from a histogram of heights in each cell: first one profile over the range for all columns, the path
+// through the cells that holds most pixels, has least beneath it and is nowhere steeper than kMaxSlope
+// (dynamic programming; an upright face has one range, so no path climbs it). Then, from near to far, what
+// each band is off that profile, its slope across limited alike. Where the plane holds as much as the
+// profile, the surface is the plane itself.
+class GroundSurface {
+  public:
+    static constexpr int kBands = 12;
+    static constexpr double kMaxSlope = 0.25;
+
+    // Disparities searched as in GroundFinder.
+    void take(Arena& arena, int width, int height, int min_disparity, int disparities);
+
+    // Uses every second pixel of every second row. `offset_px` is measured minus true disparity, `focal_px`
+    // need only be about right, tolerance is a share of the camera's height.
+    void find(ConstDisparityMap map, const DisparityPlane& plane, double offset_px, double focal_px,
+              double tolerance, Parallel& parallel);
+    // After the last find(): what lies behind a lip is cut off, cells are judged.
+    void settle(double per_row_px);
+    // The plane itself, every cell alike.
+    void flatten(CellSupport support = CellSupport::kNone);
+
+    // The plane that lies evenly between the profile's heights and depths, every metre counting alike.
+    DisparityPlane levelled(const DisparityPlane& plane, double offset_px) const;
+
+    bool flat() const { return flat_; }
+    // Cell row of a measured disparity.
+    int step_of(int disparity_q4) const { return step_of_q4_[index_of(disparity_q4)]; }
+    int steps() const { return steps_; }
+    // Of the surface above the plane, at the middle of a band.
+    double rise(int step, int band) const { return rise_[cell(step, band)]; }
+    double rise_at(int disparity_q4, int u) const;
+    CellSupport support(int disparity_q4, int u) const {
+        return support_[cell(step_of(disparity_q4), u * kBands / width_)];
+    }
+
+  private:
+    static constexpr int kHeights = 48;  // bins of a sixth of the tolerance
+    static constexpr int kZero = kHeights / 2;
+
+    std::size_t cell(int step, int band) const {
+        return static_cast<std::size_t>(step) * kBands + static_cast<std::size_t>(band);
+    }
+    std::size_t index_of(int disparity_q4) const;
+    void count(ConstDisparityMap map, const DisparityPlane& plane, double offset_px, double tolerance);
+    bool trace_profile(double per_row_px);
+    int level_of(std::size_t cell) const;
+    void cut_behind_lip(double per_row_px);
+    void judge_cells();
+
+    int width_ = 0;
+    int first_q4_ = 0;
+    int steps_ = 0;
+    bool flat_ = true;
+    double height_bin_ = 0.0;
+    double focal_times_normal_ = 0.0;  // f N, N the length of the plane's normal in disparity: Z/h = f N / d
+    std::span<std::uint16_t> step_of_q4_;
+    std::span<double> inverse_px_;     // 1 / true disparity by measured disparity
+    std::span<double> range_;          // of each step
+    std::span<std::uint16_t> counts_;  // [step][band][height]
+    std::span<std::uint16_t> totals_;  // [step][band], of any height
+    std::span<std::int32_t> pooled_;   // [step][height]
+    std::span<std::int32_t> best_;     // [step][height] of the path so far
+    std::span<std::int8_t> from_;      // [step][height] where it came from, in height bins
+    std::span<double> profile_;        // [step], in height bins from kZero
+    std::span<bool> profile_seen_;
+    std::span<float> rise_;
+    std::span<CellSupport> support_;
+};
+
+}  // namespace groundline::terrain
