@@ -218,6 +218,7 @@ void GroundFinder::tally(ConstDisparityMap map, const DisparityPlane& plane, Par
             const double at_row = plane.dv * v + plane.d0;
             RowTally row;
             for (int u = 0; u < map.width(); u += kTallyStep) {
+                if (invalid[u] == Invalid::kBody) continue;  // the robot's own parts hide nothing
                 const bool valid = invalid[u] == Invalid::kNone;
                 row.blocked += valid ? 0 : 1;
                 const double expected = plane.du * u + at_row;

@@ -183,7 +183,7 @@ TEST(Sectors, RangeEdgePixelsBlockAtTheNearestRange) {
     bench.ground.pose = world.pose;
     FixedVector<Obstacle, kMaxObstacles> obstacles;
     Serial serial;
-    bench.classifier.classify(bench.map, bench.ground, GroundUse::kOwn, {}, bench.mask, obstacles,
+    bench.classifier.classify(bench.map, bench.ground, GroundUse::kOwn, bench.surface, bench.mask, obstacles,
                               bench.range_limit_m, serial);
     bench.finder.find(bench.map, bench.ground, bench.mask, bench.sectors);
     ASSERT_EQ(obstacles.size(), 1U);
