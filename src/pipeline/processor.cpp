@@ -5,6 +5,7 @@
 
 #include "core/clock.hpp"
 #include "rig/photometric.hpp"
+#include "terrain/shares.hpp"
 #include "terrain/v_disparity.hpp"
 
 namespace groundline::pipeline {
@@ -122,8 +123,8 @@ void Processor::process(const StereoFrame& frame, FrameResult& result) {
     result.ground = decision.ground;
     clock.end(Stage::kGround);
 
-    classifier_.classify(result.disparity, result.ground, decision.use, ground_finder_.surface(),
-                         result.mask, result.obstacles, result.range_limit_m, parallel_);
+    classifier_.classify(result.disparity, result.ground, decision.use, ground_finder_.surface(), result.mask,
+                         result.obstacles, result.range_limit_m, parallel_);
     sector_finder_.find(result.disparity, result.ground, result.mask, result.sectors);
     if (elevation_grid_) elevation_grid_->find(result.disparity, result.ground, result.mask, result.grid);
     terrain::shares_of(result.mask, result.share);

@@ -1,11 +1,12 @@
 #include "terrain/classifier.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cmath>
 #include <limits>
 
-#include "core/deterministic_math.hpp"
+#include "terrain/obstacles.hpp"
 
 namespace groundline::terrain {
 namespace {
@@ -237,50 +238,7 @@ void Classifier::classify(ConstDisparityMap map, const Ground& ground, GroundUse
     rules.range_edge_q4 = last_disparity_ * kDisparityOne;
     components_.find(map, rules, out, things_);
     outline_.apply(config_.gap_px, config_.blur_px, map.invalid, out);
-
-    for (const Thing& thing : things_) {
-        Obstacle obstacle;
-        obstacle.kind = thing.kind;
-        obstacle.overhang = thing.overhang;
-        obstacle.left = thing.left;
-        obstacle.top = thing.top;
-        obstacle.right = thing.right;
-        obstacle.bottom = thing.bottom;
-        obstacle.pixels = thing.pixels;
-        obstacle.disparity_px = thing.median_px;
-        if (metric) {
-            const double scale = rig_.focal_px * rig_.baseline_m;
-            obstacle.range_m = scale / std::max(thing.near_px, 1.0 / kDisparityOne);
-            obstacle.range_sigma_m = obstacle.range_m * obstacle.range_m * config_.sigma_disparity_px / scale;
-            obstacle.bearing_rad = det::atan2(rig_.cx_px - 0.5 * (thing.left + thing.right), rig_.focal_px);
-            obstacle.height_m = thing.ratio_high * ground.pose.height_m;
-            obstacle.lowest_m = thing.ratio_low * ground.pose.height_m;
-        }
-        obstacles.push_back(obstacle);
-    }
-}
-
-void shares_of(ConstMask mask, std::array<double, kTerrainClasses>& share) {
-    std::array<std::int64_t, kTerrainClasses> counts{};
-    for (int v = 0; v < mask.height; ++v) {
-        const TerrainClass* kinds = mask.row(v);
-        // Three sums without branches; class 0 is the rest.
-        std::int32_t ones = 0;
-        std::int32_t twos = 0;
-        std::int32_t threes = 0;
-        for (int u = 0; u < mask.width; ++u) {
-            ones += kinds[u] == TerrainClass::kTraversable ? 1 : 0;
-            twos += kinds[u] == TerrainClass::kObstacle ? 1 : 0;
-            threes += kinds[u] == TerrainClass::kDrop ? 1 : 0;
-        }
-        counts[1] += ones;
-        counts[2] += twos;
-        counts[3] += threes;
-        counts[0] += mask.width - ones - twos - threes;
-    }
-    const double pixels = static_cast<double>(mask.width) * mask.height;
-    for (std::size_t i = 0; i < counts.size(); ++i)
-        share[i] = pixels > 0.0 ? static_cast<double>(counts[i]) / pixels : 0.0;
+    obstacles_of(things_, rig_, ground, config_.sigma_disparity_px, obstacles);
 }
 
 }  // namespace groundline::terrain

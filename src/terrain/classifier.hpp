@@ -1,7 +1,6 @@
 // From disparities and ground to classes, obstacles and the range up to which the ground can be certified.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <span>
 
@@ -68,8 +67,5 @@ class Classifier {
     Outline outline_;
     FixedVector<Thing, kMaxObstacles> things_;
 };
-
-// Share of the mask's pixels in each class.
-void shares_of(ConstMask mask, std::array<double, kTerrainClasses>& share);
 
 }  // namespace groundline::terrain

@@ -7,6 +7,7 @@
 #include "support/allocation_count.hpp"
 #include "terrain/ground_finder.hpp"
 #include "terrain/sectors.hpp"
+#include "terrain/shares.hpp"
 #include "terrain/v_disparity.hpp"
 #include "unit/terrain_scene.hpp"
 

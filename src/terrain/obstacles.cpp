@@ -1,0 +1,36 @@
+#include "terrain/obstacles.hpp"
+
+#include <algorithm>
+
+#include "core/deterministic_math.hpp"
+
+namespace groundline::terrain {
+
+void obstacles_of(const FixedVector<Thing, kMaxObstacles>& things, const RectifiedRig& rig,
+                  const Ground& ground, double sigma_disparity_px,
+                  FixedVector<Obstacle, kMaxObstacles>& obstacles) {
+    const bool metric = rig.calibrated && ground.metric;
+    obstacles.clear();
+    for (const Thing& thing : things) {
+        Obstacle obstacle;
+        obstacle.kind = thing.kind;
+        obstacle.overhang = thing.overhang;
+        obstacle.left = thing.left;
+        obstacle.top = thing.top;
+        obstacle.right = thing.right;
+        obstacle.bottom = thing.bottom;
+        obstacle.pixels = thing.pixels;
+        obstacle.disparity_px = thing.median_px;
+        if (metric) {
+            const double scale = rig.focal_px * rig.baseline_m;
+            obstacle.range_m = scale / std::max(thing.near_px, 1.0 / kDisparityOne);
+            obstacle.range_sigma_m = obstacle.range_m * obstacle.range_m * sigma_disparity_px / scale;
+            obstacle.bearing_rad = det::atan2(rig.cx_px - 0.5 * (thing.left + thing.right), rig.focal_px);
+            obstacle.height_m = thing.ratio_high * ground.pose.height_m;
+            obstacle.lowest_m = thing.ratio_low * ground.pose.height_m;
+        }
+        obstacles.push_back(obstacle);
+    }
+}
+
+}  // namespace groundline::terrain
