@@ -45,13 +45,15 @@ double ground_disparity_at_the_corners(const synth::Scene& scene) {
 
 TEST(TerrainSuite, DrawsEveryPoseWithinItsLimits) {
     std::set<std::string> scenes;
-    std::set<std::string> specs;
+    std::set<double> pitches;
+    std::size_t frames = 0;
     for (const char* name : {"synthetic:", "synthetic:free", "synthetic:ditches"}) {
         for (const SuiteFrame& frame : terrain_suite(name, 30).frames) {
             SCOPED_TRACE(frame.spec);
             scenes.insert(frame.scene);
-            EXPECT_TRUE(specs.insert(frame.scene + frame.spec).second);
+            ++frames;
             const synth::Scene scene = synth::scene_by_name("synthetic:" + frame.spec);
+            pitches.insert(det::degrees(scene.mount.pitch_rad));
             EXPECT_EQ(scene.seed, frame.seed);
             EXPECT_EQ(scene.frames, 1);
             EXPECT_TRUE(scene.rig.width == 640 && scene.rig.height == 480);
@@ -67,6 +69,9 @@ TEST(TerrainSuite, DrawsEveryPoseWithinItsLimits) {
         }
     }
     EXPECT_GE(scenes.size(), 14U + 5U + 1U);
+    EXPECT_GT(pitches.size(), frames * 9 / 10) << "each scene and seed has a pose of its own";
+    EXPECT_LT(*pitches.begin(), 5.5);
+    EXPECT_GT(*pitches.rbegin(), 19.5);
 }
 
 TEST(TerrainSuite, IsTheSameEveryTimeWhateverElseIsAsked) {
