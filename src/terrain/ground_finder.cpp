@@ -138,8 +138,11 @@ bool GroundFinder::fit(ConstDisparityMap map, const VDisparity& v_disparity, con
     // Without calibration the gate is so wide that facades fill it: of a drive's 26 frames 21 were found
     // among three peaks, all among five. With calibration three find as much.
     const int peaks = std::min(found.count, rig_.calibrated ? 3 : 5);
+    std::array<Line, HoughResult::kPeaks> lines{};
+    for (std::size_t i = 0; i < static_cast<std::size_t>(peaks); ++i)
+        lines[i] = refine_line(histogram, found.lines[i], cap);
     parallel.for_each(peaks * rolls, [&](int index, int) {
-        const Line line = refine_line(histogram, found.lines[static_cast<std::size_t>(index / rolls)], cap);
+        const Line line = lines[static_cast<std::size_t>(index / rolls)];
         constexpr int kMiddle = kRolls / 2;
         const double away = rolls == 1 ? 0.0 : gate.roll_max_deg * (index % rolls - kMiddle) / kMiddle;
         const double tangent = det::tan(det::radians(gate.roll_deg + away));
@@ -147,7 +150,19 @@ bool GroundFinder::fit(ConstDisparityMap map, const VDisparity& v_disparity, con
         start.du = line.slope * tangent;
         start.dv = line.slope;
         start.d0 = -line.slope * (centre_u_ * tangent + line.horizon_row) + offset_px_;
-        planes[static_cast<std::size_t>(index)] = plane_fit_.converge(start, 5.0);
+        planes[static_cast<std::size_t>(index)] = plane_fit_.approach(start);
+    });
+    // Most starts end in one of a few planes; each of those is followed once.
+    std::size_t count = 0;
+    for (const PlaneFitResult& plane : planes) {
+        const auto known = [&](const PlaneFitResult& other) { return nearly_same(plane.plane, other.plane); };
+        if (plane.found && std::none_of(planes.begin(), planes.begin() + static_cast<std::ptrdiff_t>(count), known))
+            planes[count++] = plane;
+    }
+    std::fill(planes.begin() + static_cast<std::ptrdiff_t>(count), planes.end(), PlaneFitResult{});
+    parallel.for_each(static_cast<int>(count), [&](int index, int) {
+        PlaneFitResult& plane = planes[static_cast<std::size_t>(index)];
+        plane = plane_fit_.converge(plane.plane);
     });
     // Nothing lies beneath the ground that the robot stands on.
     const auto worth = [](const PlaneFitResult& plane) { return plane.weight - plane.beneath; };
@@ -173,7 +188,7 @@ bool GroundFinder::fit(ConstDisparityMap map, const VDisparity& v_disparity, con
             const double du = kAbout[i][0] * start.dv;
             start.du += du;
             start.d0 += kAbout[i][1] - du * centre_u_;
-            about[i] = plane_fit_.converge(start, 3.0);
+            about[i] = plane_fit_.converge(start);
         });
         const PlaneFitResult before = strongest;
         for (const PlaneFitResult& plane : about)
@@ -186,7 +201,7 @@ bool GroundFinder::fit(ConstDisparityMap map, const VDisparity& v_disparity, con
         if (plane.found && inside(plane.plane, gate))
             second_ratio = std::max(second_ratio,
                                     plane_fit_.own_weight(plane.plane, strongest.plane) / strongest.weight);
-    best = plane_fit_.fit(map, strongest.plane, parallel);
+    best = plane_fit_.fit(strongest.plane, parallel);
     return best.found;
 }
 
@@ -232,7 +247,7 @@ void GroundFinder::tally(ConstDisparityMap map, const DisparityPlane& plane, Par
                     residual -= rise / (1.0 - rise) * (expected - offset_px_);
                 }
                 const double size = std::fabs(residual);
-                const double most = reach_px(kResidualPx, expected - offset_px_);
+                const double most = kernels::reach_px(kResidualPx, expected - offset_px_);
                 if (size >= most) {
                     row.standing += residual > 0.0 ? 1 : 0;
                     continue;
@@ -297,6 +312,14 @@ int GroundFinder::support_rows(const DisparityPlane& plane) {
         longest = std::max(longest, run_start - v + 1);
     }
     return longest;
+}
+
+// Whether two planes differ by less than a pixel at the picture's corners below its middle.
+bool GroundFinder::nearly_same(const DisparityPlane& a, const DisparityPlane& b) const {
+    for (const double u : {0.0, 1.0 * rig_.width})
+        for (const double v : {0.5 * rig_.height, 1.0 * rig_.height})
+            if (std::fabs(a.at(u, v) - b.at(u, v)) > 1.0) return false;
+    return true;
 }
 
 bool GroundFinder::inside(const DisparityPlane& plane, const Gate& gate) const {

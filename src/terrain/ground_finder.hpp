@@ -69,6 +69,7 @@ class GroundFinder {
     double tolerance_share(const DisparityPlane& plane) const;
     void tally(ConstDisparityMap map, const DisparityPlane& plane, Parallel& parallel);
     int support_rows(const DisparityPlane& plane);
+    bool nearly_same(const DisparityPlane& a, const DisparityPlane& b) const;
     bool inside(const DisparityPlane& plane, const Gate& gate) const;
     bool leans(const DisparityPlane& plane) const;
     double upright_mass(const VDisparity& v_disparity, int first_row);

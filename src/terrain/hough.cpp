@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "terrain/plane_fit.hpp"
+#include "terrain/plane_kernels.hpp"
 
 namespace groundline::terrain {
 namespace {
@@ -226,7 +226,7 @@ Line refine_line(const RowHistogram& histogram, const Line& start, int cap) {
             const double row = histogram.row_of(i);
             const double expected = line.at(row);
             if (expected < 1.0) continue;
-            const double reach = reach_px(tolerance, expected);
+            const double reach = kernels::reach_px(tolerance, expected);
             const double centre = (expected - histogram.first_px) * histogram.bins_per_px;
             const double reach_bins = reach * histogram.bins_per_px;
             if (centre - reach_bins >= histogram.cells.width || centre + reach_bins < 0.0) continue;

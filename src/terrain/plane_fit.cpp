@@ -6,8 +6,9 @@
 namespace groundline::terrain {
 namespace {
 
-constexpr int kStep = 2;        // every second pixel of every second row
-constexpr int kSamples = 4500;  // of the thin sample
+constexpr std::size_t kThin = 4500;
+constexpr std::size_t kDense = 60000;
+constexpr std::size_t kPart = 8192;  // samples summed by one task
 constexpr int kTile = 32;       // px, wider than any matching window's reach
 // What matching windows and sub-pixel estimates have in common over a picture, and from its middle to its
 // border: no statistic of one frame can see it. Chosen so that over 60 rendered frames (flat ground, boxes,
@@ -20,6 +21,9 @@ constexpr double kTiltVErrorPx = 0.08;
 // A pixel is near the camera where the ground has this share of its disparity in the middle of the last row.
 constexpr double kNearShare = 0.4;
 constexpr double kLastTolerancePx = 1.5;  // at which converge() and fit() end
+constexpr std::array<double, 5> kRoughPx = {5.0, 5.0, 4.0, 4.0, 3.0};
+constexpr std::array<double, 4> kThinPx = {3.0, 2.0, 1.5, 1.5};
+constexpr std::array<double, 3> kDensePx = {2.0, 1.5, 1.5};
 
 // Symmetric 3 x 3, row-major; false where it is singular for practical purposes.
 bool invert(const std::array<double, 9>& m, std::array<double, 9>& out) {
@@ -35,238 +39,199 @@ bool invert(const std::array<double, 9>& m, std::array<double, 9>& out) {
     return true;
 }
 
-double tukey(double t) {
-    const double inside = 1.0 - t * t;
-    return inside * inside;
-}
-
 }  // namespace
 
-// Normal equations of residuals about a plane, coordinates from the middle of the picture.
-struct PlaneFit::Moments {
-    double w = 0, u = 0, v = 0, uu = 0, uv = 0, vv = 0, r = 0, ur = 0, vr = 0;
+void PlaneFit::Set::take(Arena& arena, std::size_t most) {
+    most += kernels::kSampleLanes;
+    u = arena.take<float>(most);
+    v = arena.take<float>(most);
+    d_px = arena.take<float>(most);
+}
 
-    std::array<double, 9> matrix() const { return {uu, uv, u, uv, vv, v, u, v, w}; }
-};
+void PlaneFit::Set::add(int u_px, int v_px, float disparity_px) {
+    u[used] = static_cast<float>(u_px);
+    v[used] = static_cast<float>(v_px);
+    d_px[used++] = disparity_px;
+}
+
+void PlaneFit::Set::fill_up() {
+    while (used % kernels::kSampleLanes != 0)
+        add(0, 0, kernels::kNoSample);
+}
+
+kernels::Samples PlaneFit::Set::samples(std::size_t first, std::size_t count) const {
+    return {u.data() + first, v.data() + first, d_px.data() + first, count};
+}
 
 void PlaneFit::take(Arena& arena, int width, int height) {
     width_ = width;
     height_ = height;
     tile_columns_ = (width + kTile - 1) / kTile;
     tile_rows_ = (height + kTile - 1) / kTile;
-    const auto per_step = [&](int step) {
-        return static_cast<std::size_t>((width + step - 1) / step) *
-               static_cast<std::size_t>((height + step - 1) / step);
+    const auto count = [&](int step_u, int step_v) {
+        return static_cast<std::size_t>((width + step_u - 1) / step_u) *
+               static_cast<std::size_t>((height + step_v - 1) / step_v);
     };
-    while (per_step(sample_step_) > static_cast<std::size_t>(kSamples))
-        ++sample_step_;
-    samples_ = arena.take<Sample>(per_step(sample_step_));
-    rows_ = arena.take<RowSums>(static_cast<std::size_t>((height + kStep - 1) / kStep));
+    while (count(thin_step_, thin_step_) > kThin)
+        ++thin_step_;
+    while (count(step_u_, step_v_) > kDense) {
+        step_u_ += 2;
+        ++step_v_;
+    }
+    rough_.take(arena, count(2 * thin_step_, 2 * thin_step_));
+    thin_.take(arena, count(thin_step_, thin_step_));
+    dense_.take(arena, count(step_u_, step_v_));
+    parts_ = arena.take<kernels::PlaneMoments>(count(step_u_, step_v_) / kPart + 1);
     tiles_ =
         arena.take<Score>(static_cast<std::size_t>(tile_columns_) * static_cast<std::size_t>(tile_rows_));
-    slopes_ = arena.take<double>(static_cast<std::size_t>(tile_rows_));
-    weights_ = arena.take<double>(static_cast<std::size_t>(tile_rows_));
 }
 
 void PlaneFit::sample(ConstDisparityMap map, double offset_px) {
     offset_px_ = offset_px;
-    samples_used_ = 0;
-    for (int v = sample_step_ / 2; v < height_; v += sample_step_) {
-        const std::int16_t* disparity = map.disparity_q4.row(v);
-        const Invalid* invalid = map.invalid.row(v);
-        for (int u = sample_step_ / 2; u < width_; u += sample_step_) {
-            if (invalid[u] != Invalid::kNone) continue;
-            samples_[samples_used_++] = {static_cast<float>(u), static_cast<float>(v),
-                                         static_cast<float>(disparity[u]) * (1.0F / kDisparityOne)};
+    rough_.used = thin_.used = dense_.used = 0;
+    // Coordinates from the middle, where floats of the sums lose least.
+    const int middle_u = width_ / 2;
+    const int middle_v = height_ / 2;
+    const auto each = [&](int first, int step_u, int step_v, auto put) {
+        for (int v = first; v < height_; v += step_v) {
+            const std::int16_t* disparity = map.disparity_q4.row(v);
+            const Invalid* invalid = map.invalid.row(v);
+            for (int u = first; u < width_; u += step_u)
+                if (invalid[u] == Invalid::kNone)
+                    put(u, v, static_cast<float>(disparity[u]) * (1.0F / kDisparityOne));
         }
-    }
+    };
+    each(thin_step_ / 2, thin_step_, thin_step_, [&](int u, int v, float d_px) {
+        thin_.add(u - middle_u, v - middle_v, d_px);
+        if (u / thin_step_ % 2 == 0 && v / thin_step_ % 2 == 0) rough_.add(u - middle_u, v - middle_v, d_px);
+    });
+    each(0, step_u_, step_v_, [&](int u, int v, float d_px) { dense_.add(u - middle_u, v - middle_v, d_px); });
+    rough_.fill_up();
+    thin_.fill_up();
+    dense_.fill_up();
 }
 
-bool PlaneFit::improve(const Moments& moments, DisparityPlane& plane) const {
+DisparityPlane PlaneFit::centred(const DisparityPlane& plane) const {
+    return {plane.du, plane.dv, plane.at(width_ / 2, height_ / 2)};
+}
+DisparityPlane PlaneFit::uncentred(const DisparityPlane& plane) const {
+    return {plane.du, plane.dv, plane.at(-(width_ / 2), -(height_ / 2))};
+}
+
+kernels::PlaneWeights PlaneFit::weights_of(const DisparityPlane& plane, double tolerance_px) const {
+    return {static_cast<float>(plane.du), static_cast<float>(plane.dv), static_cast<float>(plane.d0),
+            static_cast<float>(offset_px_), static_cast<float>(tolerance_px)};
+}
+
+bool PlaneFit::improve(const kernels::PlaneMoments& moments, DisparityPlane& plane) {
+    const auto [w, wu, wv, wuu, wuv, wvv, wr, wur, wvr] = moments;
     std::array<double, 9> inverse{};
-    if (moments.w < 20.0 || !invert(moments.matrix(), inverse)) return false;
-    const auto solve = [&](std::size_t row) {
-        return inverse[row] * moments.ur + inverse[row + 1] * moments.vr + inverse[row + 2] * moments.r;
-    };
-    const double du = solve(0);
-    const double dv = solve(3);
-    plane.du += du;
-    plane.dv += dv;
-    plane.d0 += solve(6) - du * (0.5 * width_) - dv * (0.5 * height_);
+    if (w < 20.0 || !invert({wuu, wuv, wu, wuv, wvv, wv, wu, wv, w}, inverse)) return false;
+    plane.du += inverse[0] * wur + inverse[1] * wvr + inverse[2] * wr;
+    plane.dv += inverse[3] * wur + inverse[4] * wvr + inverse[5] * wr;
+    plane.d0 += inverse[6] * wur + inverse[7] * wvr + inverse[8] * wr;
     return true;
 }
 
-PlaneFitResult PlaneFit::converge(const DisparityPlane& start, double first_tolerance_px) const {
-    constexpr std::array<double, 11> kTolerancesPx = {5.0, 5.0, 4.0, 4.0, 3.0, 3.0, 2.0, 2.0, 1.5, 1.5, 1.5};
+PlaneFitResult PlaneFit::descend(const Set& set, const DisparityPlane& start,
+                                 std::span<const double> tolerances_px) const {
     PlaneFitResult result;
-    DisparityPlane plane = start;
-    for (const double tolerance : kTolerancesPx) {
-        if (tolerance > first_tolerance_px) continue;
-        Moments sums;
-        for (std::size_t i = 0; i < samples_used_; ++i) {
-            const Sample& sample = samples_[i];
-            const double expected = plane.at(sample.u, sample.v);
-            const double residual = sample.d_px - expected;
-            const double ground = expected - offset_px_;
-            const double reach = reach_px(tolerance, ground);
-            if (ground < 1.0 || !(residual < reach && residual > -reach)) continue;
-            const double weight = tukey(residual / reach);
-            const double x = sample.u - 0.5 * width_;
-            const double y = sample.v - 0.5 * height_;
-            const double wx = weight * x;
-            const double wy = weight * y;
-            sums.w += weight;
-            sums.u += wx;
-            sums.v += wy;
-            sums.uu += wx * x;
-            sums.uv += wx * y;
-            sums.vv += wy * y;
-            sums.r += weight * residual;
-            sums.ur += wx * residual;
-            sums.vr += wy * residual;
-        }
-        if (!improve(sums, plane)) return result;
-        result.weight = sums.w;
+    DisparityPlane plane = centred(start);
+    for (const double tolerance : tolerances_px) {
+        const kernels::PlaneMoments moments = kernels::plane_moments(set.all(), weights_of(plane, tolerance));
+        if (!improve(moments, plane)) return result;
+        result.weight = moments[0];
     }
-    result.plane = plane;
+    result.plane = uncentred(plane);
     result.found = true;
-    const double near_px = kNearShare * (plane.at(0.5 * width_, height_ - 1.0) - offset_px_);
-    for (std::size_t i = 0; i < samples_used_; ++i) {
-        const double expected = plane.at(samples_[i].u, samples_[i].v);
-        const bool near = expected - offset_px_ >= near_px;
-        result.beneath += near && samples_[i].d_px < expected - kLastTolerancePx ? 1.0 : 0.0;
-    }
+    return result;
+}
+
+PlaneFitResult PlaneFit::approach(const DisparityPlane& start) const {
+    return descend(rough_, start, kRoughPx);
+}
+
+PlaneFitResult PlaneFit::converge(const DisparityPlane& start) const {
+    PlaneFitResult result = descend(thin_, start, kThinPx);
+    if (!result.found) return result;
+    const double near_px = kNearShare * (result.plane.at(0.5 * width_, height_ - 1.0) - offset_px_);
+    result.beneath = kernels::count_beneath(thin_.all(), weights_of(centred(result.plane), kLastTolerancePx),
+                                            static_cast<float>(kLastTolerancePx),
+                                            static_cast<float>(std::max(1.0, near_px)));
     return result;
 }
 
 double PlaneFit::own_weight(const DisparityPlane& plane, const DisparityPlane& other) const {
-    const auto weight_on = [&](const DisparityPlane& candidate, const Sample& sample) {
-        const double expected = candidate.at(sample.u, sample.v);
-        const double residual = sample.d_px - expected;
-        const double reach = reach_px(kLastTolerancePx, expected - offset_px_);
-        if (expected - offset_px_ < 1.0 || !(residual < reach && residual > -reach)) return 0.0;
-        return tukey(residual / reach);
-    };
-    double weight = 0.0;
-    for (std::size_t i = 0; i < samples_used_; ++i)
-        if (weight_on(other, samples_[i]) == 0.0) weight += weight_on(plane, samples_[i]);
-    return weight;
+    return kernels::own_moment(thin_.all(), weights_of(centred(plane), kLastTolerancePx),
+                               weights_of(centred(other), kLastTolerancePx));
 }
 
-void PlaneFit::sum_rows(ConstDisparityMap map, const DisparityPlane& plane, double tolerance_px,
-                        Parallel& parallel) {
-    constexpr int kRowsPerTask = 16;
-    const int rows = static_cast<int>(rows_.size());
-    const double middle_u = 0.5 * width_;
-    parallel.for_each((rows + kRowsPerTask - 1) / kRowsPerTask, [&](int task, int) {
-        for (int i = task * kRowsPerTask; i < std::min(rows, (task + 1) * kRowsPerTask); ++i) {
-            const int v = i * kStep;
-            const std::int16_t* disparity = map.disparity_q4.row(v);
-            const Invalid* invalid = map.invalid.row(v);
-            const double at_row = plane.dv * v + plane.d0;
-            RowSums sums{};
-            for (int u = 0; u < width_; u += kStep) {
-                if (invalid[u] != Invalid::kNone) continue;
-                const double expected = plane.du * u + at_row;
-                const double ground = expected - offset_px_;
-                const double reach = reach_px(tolerance_px, ground);
-                const double residual = disparity[u] * (1.0 / kDisparityOne) - expected;
-                if (ground < 1.0 || !(residual < reach && residual > -reach)) continue;
-                const double weight = tukey(residual / reach);
-                const double x = u - middle_u;
-                const double wx = weight * x;
-                const double wr = weight * residual;
-                sums.w += weight;
-                sums.wu += wx;
-                sums.wuu += wx * x;
-                sums.wd += wr;
-                sums.wud += wr * x;
-            }
-            rows_[static_cast<std::size_t>(i)] = sums;
-        }
-    });
-}
-
-PlaneFit::Moments PlaneFit::moments_of_rows() const {
-    Moments sums;
-    for (std::size_t i = 0; i < rows_.size(); ++i) {
-        const RowSums& row = rows_[i];
-        const double y = static_cast<double>(i) * kStep - 0.5 * height_;
-        sums.w += row.w;
-        sums.u += row.wu;
-        sums.v += row.w * y;
-        sums.uu += row.wuu;
-        sums.uv += row.wu * y;
-        sums.vv += row.w * y * y;
-        sums.r += row.wd;
-        sums.ur += row.wud;
-        sums.vr += row.wd * y;
-    }
-    return sums;
-}
-
-PlaneFitResult PlaneFit::fit(ConstDisparityMap map, const DisparityPlane& start, Parallel& parallel) {
-    constexpr std::array<double, 5> kTolerancesPx = {2.0, 1.5, 1.5, 1.5, 1.5};
+PlaneFitResult PlaneFit::fit(const DisparityPlane& start, Parallel& parallel) {
     PlaneFitResult result;
-    result.plane = start;
-    for (const double tolerance : kTolerancesPx) {
-        sum_rows(map, result.plane, tolerance, parallel);
-        const Moments sums = moments_of_rows();
-        if (!improve(sums, result.plane)) return result;
-        result.weight = sums.w;
+    DisparityPlane plane = centred(start);
+    kernels::PlaneMoments moments{};
+    const int parts = static_cast<int>((dense_.used + kPart - 1) / kPart);
+    for (const double tolerance : kDensePx) {
+        const kernels::PlaneWeights weights = weights_of(plane, tolerance);
+        parallel.for_each(parts, [&](int part, int) {
+            const std::size_t first = static_cast<std::size_t>(part) * kPart;
+            parts_[static_cast<std::size_t>(part)] = kernels::plane_moments(
+                dense_.samples(first, std::min(kPart, dense_.used - first)), weights);
+        });
+        moments = {};
+        for (std::size_t part = 0; part < static_cast<std::size_t>(parts); ++part)
+            for (std::size_t k = 0; k < moments.size(); ++k)
+                moments[k] += parts_[part][k];
+        if (!improve(moments, plane)) return result;
     }
+    result.weight = moments[0];
+    result.plane = plane;
     result.found = true;
-    covariance(map, parallel, result);
+    finish(result);
+    result.plane = uncentred(result.plane);
     return result;
 }
 
-void PlaneFit::covariance(ConstDisparityMap map, Parallel& parallel, PlaneFitResult& result) {
+// The last step, in doubles, of a plane about the middle of the picture, and its covariance.
+void PlaneFit::finish(PlaneFitResult& result) {
     const DisparityPlane plane = result.plane;
-    const double middle_u = 0.5 * width_;
-    const double middle_v = 0.5 * height_;
-    parallel.for_each(tile_rows_, [&](int tile_row, int) {
-        Score* tiles = &tiles_[static_cast<std::size_t>(tile_row * tile_columns_)];
-        std::fill_n(tiles, tile_columns_, Score{});
-        double slope_sum = 0.0;
-        double weight_sum = 0.0;
-        for (int v = tile_row * kTile; v < std::min(height_, (tile_row + 1) * kTile); v += kStep) {
-            const std::int16_t* disparity = map.disparity_q4.row(v);
-            const Invalid* invalid = map.invalid.row(v);
-            const double at_row = plane.dv * v + plane.d0;
-            const double y = v - middle_v;
-            for (int u = 0; u < width_; u += kStep) {
-                if (invalid[u] != Invalid::kNone) continue;
-                const double expected = plane.du * u + at_row;
-                const double ground = expected - offset_px_;
-                const double reach = reach_px(kLastTolerancePx, ground);
-                const double residual = disparity[u] * (1.0 / kDisparityOne) - expected;
-                if (ground < 1.0 || !(residual < reach && residual > -reach)) continue;
-                const double t2 = residual * residual / (reach * reach);
-                const double weight = (1.0 - t2) * (1.0 - t2);
-                const double score = weight * residual;
-                Score& tile = tiles[u / kTile];
-                tile.s += score;
-                tile.su += score * (u - middle_u);
-                tile.sv += score * y;
-                weight_sum += weight;
-                slope_sum += (1.0 - t2) * (1.0 - 5.0 * t2);
-            }
-        }
-        slopes_[static_cast<std::size_t>(tile_row)] = slope_sum;
-        weights_[static_cast<std::size_t>(tile_row)] = weight_sum;
-    });
+    kernels::PlaneMoments moments{};
+    const double middle_u = width_ / 2;
+    const double middle_v = height_ / 2;
+    std::fill(tiles_.begin(), tiles_.end(), Score{});
+    double slope_sum = 0.0;
+    for (std::size_t i = 0; i < dense_.used; ++i) {
+        const double u = dense_.u[i];
+        const double v = dense_.v[i];
+        const double expected = plane.du * u + plane.dv * v + plane.d0;
+        const double ground = expected - offset_px_;
+        const double residual = dense_.d_px[i] - expected;
+        const double reach = kernels::reach_px(kLastTolerancePx, ground);
+        if (ground < 1.0 || !(residual < reach && residual > -reach)) continue;
+        const double t2 = residual * residual / (reach * reach);
+        const double weight = (1.0 - t2) * (1.0 - t2);
+        const double score = weight * residual;
+        const int column = (static_cast<int>(dense_.u[i]) + width_ / 2) / kTile;
+        const int row = (static_cast<int>(dense_.v[i]) + height_ / 2) / kTile;
+        Score& tile = tiles_[static_cast<std::size_t>(row * tile_columns_ + column)];
+        tile.s += score;
+        tile.su += score * u;
+        tile.sv += score * v;
+        const double by_u = weight * u;
+        const double by_v = weight * v;
+        const std::array<double, 9> terms = {weight,   by_u,  by_v,      by_u * u, by_u * v,
+                                             by_v * v, score, score * u, score * v};
+        for (std::size_t k = 0; k < terms.size(); ++k)
+            moments[k] += terms[k];
+        slope_sum += (1.0 - t2) * (1.0 - 5.0 * t2);
+    }
 
     // The curvature of the objective is that of the weights times the mean slope of the score: Tukey's
     // falls with scatter. Below a fifth the fit means little, and the verdict has other reasons to say so.
-    double slope_sum = 0.0;
-    double weight_sum = 0.0;
-    for (int i = 0; i < tile_rows_; ++i) {
-        slope_sum += slopes_[static_cast<std::size_t>(i)];
-        weight_sum += weights_[static_cast<std::size_t>(i)];
-    }
-    const double curvature = std::max(0.2, slope_sum / weight_sum);
+    const double curvature = std::max(0.2, slope_sum / moments[0]);
     std::array<double, 9> inverse{};
-    if (!invert(moments_of_rows().matrix(), inverse)) {
+    const auto [w, wu, wv, wuu, wuv, wvv, wr, wur, wvr] = moments;
+    if (!improve(moments, result.plane) || !invert({wuu, wuv, wu, wuv, wvv, wv, wu, wv, w}, inverse)) {
         result.found = false;
         return;
     }

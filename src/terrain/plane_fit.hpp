@@ -9,6 +9,7 @@
 #include "core/disparity.hpp"
 #include "core/ground.hpp"
 #include "core/parallel.hpp"
+#include "terrain/plane_kernels.hpp"
 
 namespace groundline::terrain {
 
@@ -20,17 +21,9 @@ struct PlaneFitResult {
     double beneath = 0.0;                // of converge(): samples that lie beneath it near the camera
 };
 
-// How far from the ground a pixel may lie to take part, where the ground's true disparity is ground_px: the
-// tolerance, but never more than half a pixel and a quarter of that disparity, so that far away a thing of a
-// few decimetres is not taken for ground.
-inline double reach_px(double tolerance_px, double ground_px) {
-    return std::min(std::max(tolerance_px, std::min(4.0, 0.08 * ground_px)), 0.5 + 0.25 * ground_px);
-}
-
-// Iteratively reweighted least squares with Tukey weights, in two steps: converge() brings any number of
-// rough starts on a thin sample of pixels to the plane next to each, tolerance 5, 4, 3, 2, 1.5 px; fit()
-// refines the best on every second pixel of every second row. Each within
-// reach_px.
+// Iteratively reweighted least squares with Tukey weights, on three samples of the pixels, each thinner than
+// the one before: approach() brings rough starts near to the plane next to each, converge() to it, fit()
+// refines the best. Pixels within reach_px take part.
 //
 // Covariance: neighbouring pixels share their matching errors, so counting them as independent would
 // understate it by a factor of 5 to 30. Residuals are summed over tiles of 32 x 32 px, which do not share
@@ -42,46 +35,53 @@ class PlaneFit {
   public:
     void take(Arena& arena, int width, int height);
 
-    // Takes the thin sample of a frame; `offset_px` is measured minus true disparity. Call first.
+    // Takes the samples of a frame; `offset_px` is measured minus true disparity. Call first.
     void sample(ConstDisparityMap map, double offset_px);
-    // Leaves out the tolerances above first_tolerance_px. found is false where too few pixels or a degenerate
-    // spread remain; no covariance. May be called from several lanes at once.
-    PlaneFitResult converge(const DisparityPlane& start, double first_tolerance_px) const;
-    // Weight of the thin sample on `plane` that is not on `other`: what this plane alone explains.
+    // Tolerances 5, 5, 4, 4, 3 px on about 1 000 pixels. found is false where too few pixels or a degenerate
+    // spread remain; no covariance. These two may be called from several lanes at once.
+    PlaneFitResult approach(const DisparityPlane& start) const;
+    // Tolerances 3, 2, 1.5, 1.5 px on about 4 500 pixels, and what lies beneath.
+    PlaneFitResult converge(const DisparityPlane& start) const;
+    // Weight of the pixels of converge() on `plane` that are not on `other`: what this plane alone explains.
     double own_weight(const DisparityPlane& plane, const DisparityPlane& other) const;
-    // Sums are in a fixed order, whatever the lanes.
-    PlaneFitResult fit(ConstDisparityMap map, const DisparityPlane& start, Parallel& parallel);
+    // On up to 60 000 pixels; sums are in a fixed order, whatever the lanes.
+    PlaneFitResult fit(const DisparityPlane& start, Parallel& parallel);
 
   private:
-    struct Sample {
-        float u, v, d_px;
-    };
-    struct RowSums {
-        double w, wu, wuu, wd, wud;
+    struct Set {
+        std::span<float> u, v, d_px;
+        std::size_t used = 0;
+        void take(Arena& arena, std::size_t most);
+        void add(int u_px, int v_px, float disparity_px);
+        void fill_up();
+        kernels::Samples samples(std::size_t first, std::size_t count) const;
+        kernels::Samples all() const { return samples(0, used); }
     };
     struct Score {
         double s, su, sv;
     };
-    struct Moments;
 
-    void sum_rows(ConstDisparityMap map, const DisparityPlane& plane, double tolerance_px,
-                  Parallel& parallel);
-    Moments moments_of_rows() const;
-    bool improve(const Moments& moments, DisparityPlane& plane) const;
-    void covariance(ConstDisparityMap map, Parallel& parallel, PlaneFitResult& result);
+    kernels::PlaneWeights weights_of(const DisparityPlane& plane, double tolerance_px) const;
+    static bool improve(const kernels::PlaneMoments& moments, DisparityPlane& plane);
+    DisparityPlane centred(const DisparityPlane& plane) const;
+    DisparityPlane uncentred(const DisparityPlane& plane) const;
+    PlaneFitResult descend(const Set& set, const DisparityPlane& start,
+                           std::span<const double> tolerances_px) const;
+    void finish(PlaneFitResult& result);
 
     int width_ = 0;
     int height_ = 0;
     int tile_columns_ = 0;
     int tile_rows_ = 0;
-    int sample_step_ = 1;
-    std::size_t samples_used_ = 0;
+    int step_u_ = 4;  // of the pixels of fit()
+    int step_v_ = 2;
+    int thin_step_ = 1;
     double offset_px_ = 0.0;
-    std::span<Sample> samples_;
-    std::span<RowSums> rows_;
+    Set rough_;  // of approach()
+    Set thin_;   // of converge()
+    Set dense_;  // of fit()
+    std::span<kernels::PlaneMoments> parts_;
     std::span<Score> tiles_;
-    std::span<double> slopes_;   // per tile row, sum of the derivative of the score
-    std::span<double> weights_;  // per tile row
 };
 
 }  // namespace groundline::terrain

@@ -177,9 +177,9 @@ TEST(PlaneFit, CovarianceCoversErrorsThatNeighboursShare) {
                     static_cast<std::int16_t>(std::floor(16.0 * (truth.at(u, v) + patch[u / 16]) + 0.5));
         }
         fit.sample(map, 0.0);
-        const PlaneFitResult rough = fit.converge({0.012, 0.19, 6.0}, 5.0);
+        const PlaneFitResult rough = fit.converge(fit.approach({0.012, 0.19, 6.0}).plane);
         ASSERT_TRUE(rough.found);
-        const PlaneFitResult result = fit.fit(map, rough.plane, serial);
+        const PlaneFitResult result = fit.fit(rough.plane, serial);
         ASSERT_TRUE(result.found);
         const double x[3] = {160.0, 230.0, 1.0};
         // Without the fixed terms, common and along v, which are not what this is about.
