@@ -6,20 +6,16 @@
 #include <cmath>
 #include <limits>
 
+#include "terrain/classify_kernels.hpp"
 #include "terrain/obstacles.hpp"
 
 namespace groundline::terrain {
 namespace {
 
-// Disparities in the wedge test carry 20 fractional bits, its factors 20, their product 40: sixteenths of a
-// pixel up to 2^12 stay below 2^53, and a factor's rounding moves a limit by less than 1e-6 of the height.
-constexpr int kBits = 20;
-constexpr double kLargestPx = 1e5;  // |ground disparity| anywhere in the picture; 2^40 times it fits 63 bits
-constexpr double kLeastPx = 1.0;    // class 1 needs a disparity to speak of: as in the fit of the ground
-
-std::int64_t fixed(double value, int bits) {
-    return static_cast<std::int64_t>(std::floor(value * static_cast<double>(std::int64_t{1} << bits) + 0.5));
-}
+constexpr int kBits = 16;  // of the limits' fraction, beside sixteenths: a millionth of a pixel
+// |ground disparity| anywhere in the picture; beyond 1000 px a step over 64 columns would overflow.
+constexpr double kLargestPx = 1000.0;
+constexpr double kLeastPx = 1.0;  // class 1 needs a disparity to speak of: as in the fit of the ground
 
 }  // namespace
 
@@ -28,17 +24,11 @@ struct Classifier::Wedge {
     bool usable = false;
     DisparityPlane ground;  // true, px
     std::array<double, 9> covariance{};
-    double height_by[3] = {0.0, 0.0, 0.0};  // (1/h) dh / d(du, dv, d0)
-    double ratio_up = 0.0;                  // tolerances over the camera's height
+    double ratio_up = 0.0;  // tolerances over the camera's height
     double ratio_down = 0.0;
     double offset_px = 0.0;
     bool band = false;
-    // H > up  <=>  factor_up d > d_g;  H < -down  <=>  factor_down d < d_g
-    std::int64_t factor_up = 0;
-    std::int64_t factor_down = 0;
-    std::int64_t band_q40 = 0;
-    std::int64_t offset_q20 = 0;
-    std::int64_t du_q40 = 0, dv_q40 = 0, d0_q40 = 0;
+    double band_px = 0.0;
 };
 
 Classifier::Classifier(const TerrainConfig& config, const RectifiedRig& rig, int min_disparity,
@@ -47,7 +37,13 @@ Classifier::Classifier(const TerrainConfig& config, const RectifiedRig& rig, int
       rig_(rig),
       last_disparity_(min_disparity + disparities - 1),
       disparities_(disparities),
-      certified_q4_(arena.take<std::int32_t>(static_cast<std::size_t>(rig.width))) {
+      first_q4_(min_disparity * kDisparityOne),
+      bands_((rig.width + kernels::kClassColumns - 1) / kernels::kClassColumns),
+      table_(static_cast<std::size_t>(disparities) * kDisparityOne + 1),
+      certified_q4_(arena.take<std::int32_t>(static_cast<std::size_t>(bands_) * kernels::kClassColumns)),
+      up_q20_(arena.take<std::int32_t>(static_cast<std::size_t>(bands_) * 2 * table_)),
+      down_q20_(arena.take<std::int32_t>(up_q20_.size())) {
+    static_assert(kernels::kClassColumns == GroundSurface::kBandColumns);
     components_.take(arena, rig.width, rig.height, min_disparity, disparities, config.min_pixels);
     outline_.take(arena, rig.width, rig.height);
 }
@@ -67,37 +63,23 @@ Classifier::Wedge Classifier::wedge_of(const Ground& ground) const {
     if (metric) {
         wedge.ratio_up = config_.tolerance_up_m / ground.pose.height_m;
         wedge.ratio_down = config_.tolerance_down_m / ground.pose.height_m;
-        // h = b / N, N^2 = du^2 + dv^2 + g^2, g = d_g(centre) / f
-        const double g = wedge.ground.at(rig_.cx_px, rig_.cy_px) / rig_.focal_px;
-        const double square = wedge.ground.du * wedge.ground.du + wedge.ground.dv * wedge.ground.dv + g * g;
-        wedge.height_by[0] = -(wedge.ground.du + g * rig_.cx_px / rig_.focal_px) / square;
-        wedge.height_by[1] = -(wedge.ground.dv + g * rig_.cy_px / rig_.focal_px) / square;
-        wedge.height_by[2] = -g / rig_.focal_px / square;
     } else {
         wedge.ratio_up = wedge.ratio_down = config_.tolerance_ratio;
     }
-    wedge.factor_up = fixed(1.0 - wedge.ratio_up, kBits);
-    wedge.factor_down = fixed(1.0 + wedge.ratio_down, kBits);
-    wedge.offset_q20 = fixed(wedge.offset_px * kDisparityOne, kBits);
-    wedge.du_q40 = fixed(wedge.ground.du * kDisparityOne, 2 * kBits);
-    wedge.dv_q40 = fixed(wedge.ground.dv * kDisparityOne, 2 * kBits);
-    wedge.d0_q40 = fixed(wedge.ground.d0 * kDisparityOne, 2 * kBits);
-    double band_px = 0.0;
     switch (config_.band) {
         case Band::kOff:
             break;
         case Band::k50Rows:
-            band_px = 50.0 * wedge.ground.dv;
+            wedge.band_px = 50.0 * wedge.ground.dv;
             break;
         case Band::k50Px:
-            band_px = 50.0;
+            wedge.band_px = 50.0;
             break;
         case Band::k50Disparity8:
-            band_px = 50.0 * disparities_ / 256.0;
+            wedge.band_px = 50.0 * disparities_ / 256.0;
             break;
     }
     wedge.band = config_.band != Band::kOff;
-    wedge.band_q40 = fixed(band_px * kDisparityOne, 2 * kBits);
     return wedge;
 }
 
@@ -134,69 +116,82 @@ double Classifier::certify_columns(const Wedge& wedge) {
     return rig_.focal_px * rig_.baseline_m / farthest_px;
 }
 
-// A pixel farther than its column is certified for: sigma_H^2 = ((h - H)/d)^2 sigma_d^2 + J C J' at the pixel
-// itself, all over h^2.
-TerrainClass Classifier::beyond_range(const Wedge& wedge, int u, int v, double d_px, double rise) const {
-    const double ground_px = wedge.ground.at(u, v);
-    const double inverse = 1.0 / d_px;
-    const double ratio = 1.0 - ground_px * inverse - rise;
-    if (!(ratio > wedge.ratio_up)) return TerrainClass::kUnknown;
-    const double by[3] = {ratio * wedge.height_by[0] - u * inverse, ratio * wedge.height_by[1] - v * inverse,
-                          ratio * wedge.height_by[2] - inverse};
-    const double by_d = ground_px * inverse * inverse * config_.sigma_disparity_px;
-    double variance = by_d * by_d;
-    for (std::size_t i = 0; i < 3; ++i)
-        for (std::size_t j = 0; j < 3; ++j)
-            variance += by[i] * wedge.covariance[3 * i + j] * by[j];
-    const bool stands = ratio * ratio > config_.sigmas * config_.sigmas * variance;
-    return stands ? TerrainClass::kObstacle : TerrainClass::kUnknown;
+// Limits on the ground's disparity by a pixel's own, for the columns of each band.
+void Classifier::make_limits(const Wedge& wedge, GroundUse use, const GroundSurface& surface) {
+    constexpr double kOne = static_cast<double>(std::int32_t{1} << kBits) * kDisparityOne;
+    constexpr double kMost = 2147483000.0;
+    const auto limit = [&](double px) {
+        return static_cast<std::int32_t>(std::floor(std::clamp(px * kOne, -kMost, kMost) + 0.5));
+    };
+    const double noise = config_.sigma_disparity_px * config_.sigma_disparity_px;
+    for (int band = 0; band < bands_; ++band) {
+        // The ground's disparity is least certain at one of the corners.
+        double worst = 0.0;
+        for (const double u : {1.0 * band * kernels::kClassColumns,
+                               std::min(1.0 * rig_.width, (band + 1.0) * kernels::kClassColumns) - 1.0})
+            for (const double v : {0.0, rig_.height - 1.0}) {
+                const double x[3] = {u, v, 1.0};
+                double variance = 0.0;
+                for (std::size_t i = 0; i < 3; ++i)
+                    for (std::size_t j = 0; j < 3; ++j)
+                        variance += x[i] * wedge.covariance[3 * i + j] * x[j];
+                worst = std::max(worst, variance);
+            }
+        const double uncertain_px = config_.sigmas * std::sqrt(noise + worst);
+        const std::size_t first = static_cast<std::size_t>(band) * 2 * table_;
+        for (std::size_t i = 0; i < table_; ++i) {
+            const int measured_q4 = first_q4_ + static_cast<int>(i);
+            const double px = measured_q4 * (1.0 / kDisparityOne) - wedge.offset_px;
+            const double rise = use == GroundUse::kHeld ? 0.0 : surface.rise(measured_q4);
+            std::int32_t& up = up_q20_[first + i];
+            std::int32_t& down = down_q20_[first + i];
+            std::int32_t& up_beyond = up_q20_[first + table_ + i];
+            std::int32_t& down_beyond = down_q20_[first + table_ + i];
+            // Beyond the certified range nothing is level or a drop, at infinity or behind it nothing at all.
+            down_beyond = std::numeric_limits<std::int32_t>::max() - 1;
+            up_beyond = std::numeric_limits<std::int32_t>::min();
+            up = up_beyond;
+            down = down_beyond;
+            if (px <= 0.0) continue;
+            if (wedge.band) {
+                up = limit(px - wedge.band_px);
+                down = limit(px + wedge.band_px);
+            } else {
+                up = limit(px * (1.0 - wedge.ratio_up - rise));
+                down = limit(px * (1.0 + wedge.ratio_down - rise));
+                up_beyond = limit(px * (1.0 - std::max(wedge.ratio_up, uncertain_px / px) - rise));
+            }
+            bool level = px >= kLeastPx || !wedge.band;
+            if (use == GroundUse::kOwn || use == GroundUse::kWeak) {
+                const CellSupport support = surface.support(surface.step_of(measured_q4), band);
+                level = level && (use == GroundUse::kOwn ? support != CellSupport::kContradicted
+                                                         : support == CellSupport::kSupported);
+            } else {
+                level = false;
+            }
+            down = (down & ~std::int32_t{1}) | (level ? 1 : 0);
+        }
+    }
 }
 
-void Classifier::classify_row(ConstDisparityMap map, const Wedge& wedge, GroundUse use,
-                              const GroundSurface& surface, int v, Mask out) const {
-    const std::int16_t* disparity = map.disparity_q4.row(v);
-    const Invalid* invalid = map.invalid.row(v);
-    TerrainClass* kinds = out.row(v);
-    const std::int64_t last_q40 = fixed((last_disparity_ - 1 - wedge.offset_px) * kDisparityOne, 2 * kBits);
-    std::int64_t ground_q40 = wedge.dv_q40 * v + wedge.d0_q40;
-    for (int u = 0; u < map.width(); ++u, ground_q40 += wedge.du_q40) {
-        if (invalid[u] != Invalid::kNone) {
-            // Where the ground itself is nearer than the search range, a range-edge pixel is no news.
-            const bool nearer = invalid[u] == Invalid::kRangeEdge && ground_q40 < last_q40;
-            kinds[u] = nearer ? TerrainClass::kObstacle : TerrainClass::kUnknown;
-            continue;
-        }
-        const std::int64_t d_q20 = (std::int64_t{disparity[u]} << kBits) - wedge.offset_q20;
-        if (d_q20 <= 0) {  // at infinity or behind it
-            kinds[u] = TerrainClass::kUnknown;
-            continue;
-        }
-        TerrainClass level = TerrainClass::kUnknown;
-        if (use == GroundUse::kOwn || use == GroundUse::kWeak) {
-            const CellSupport support = surface.support(disparity[u], u);
-            const bool enough = use == GroundUse::kOwn ? support != CellSupport::kContradicted
-                                                       : support == CellSupport::kSupported;
-            if (enough) level = TerrainClass::kTraversable;
-        }
-        if (wedge.band) {
-            const std::int64_t above = (d_q20 << kBits) - ground_q40;
-            const bool usable = ground_q40 > 0 && d_q20 >= (std::int64_t{kDisparityOne} << kBits);
-            kinds[u] = above > wedge.band_q40    ? TerrainClass::kObstacle
-                       : above < -wedge.band_q40 ? TerrainClass::kDrop
-                       : usable                  ? level
-                                                 : TerrainClass::kUnknown;
-            continue;
-        }
-        const double rise = use == GroundUse::kHeld ? 0.0 : surface.rise_at(disparity[u], u);
-        if (disparity[u] < certified_q4_[static_cast<std::size_t>(u)]) {
-            const double d_px = disparity[u] * (1.0 / kDisparityOne) - wedge.offset_px;
-            kinds[u] = beyond_range(wedge, u, v, d_px, rise);
-        } else {
-            const std::int64_t shift = fixed(rise, kBits);
-            kinds[u] = (wedge.factor_up - shift) * d_q20 > ground_q40     ? TerrainClass::kObstacle
-                       : (wedge.factor_down - shift) * d_q20 < ground_q40 ? TerrainClass::kDrop
-                                                                          : level;
-        }
+void Classifier::classify_row(ConstDisparityMap map, const Wedge& wedge, int v, Mask out) const {
+    kernels::ClassRow row{};
+    row.first_q4 = first_q4_;
+    constexpr double kOne = static_cast<double>(std::int32_t{1} << kBits) * kDisparityOne;
+    row.ground_step_q20 = static_cast<std::int32_t>(std::floor(wedge.ground.du * kOne + 0.5));
+    row.last_q20 = static_cast<std::int32_t>((last_disparity_ - 1 - wedge.offset_px) * kOne);
+    for (int band = 0; band < bands_; ++band) {
+        const int u = band * kernels::kClassColumns;
+        row.disparity_q4 = map.disparity_q4.row(v) + u;
+        row.invalid = map.invalid.row(v) + u;
+        row.certified_q4 = &certified_q4_[static_cast<std::size_t>(u)];
+        // Anew for each band, so that the rounding of a step adds up over its columns alone.
+        const double ground = std::clamp(wedge.ground.at(u, v), -kLargestPx, kLargestPx);
+        row.ground_q20 = static_cast<std::int32_t>(std::floor(ground * kOne + 0.5));
+        row.count = std::min(kernels::kClassColumns, map.width() - u);
+        const std::size_t first = static_cast<std::size_t>(band) * 2 * table_;
+        kernels::classify_columns(
+            row, {&up_q20_[first], &down_q20_[first], static_cast<std::int32_t>(table_)}, out.row(v) + u);
     }
 }
 
@@ -215,13 +210,14 @@ void Classifier::classify(ConstDisparityMap map, const Ground& ground, GroundUse
         return;
     }
     const double farthest_m = certify_columns(wedge);
+    make_limits(wedge, use, surface);
     if (use != GroundUse::kHeld) range_limit_m = farthest_m;
 
     constexpr int kRowsPerTask = 16;
     const int tasks = (map.height() + kRowsPerTask - 1) / kRowsPerTask;
     parallel.for_each(tasks, [&](int task, int) {
         for (int v = task * kRowsPerTask; v < std::min(map.height(), (task + 1) * kRowsPerTask); ++v) {
-            classify_row(map, wedge, use, surface, v, out);
+            classify_row(map, wedge, v, out);
         }
     });
 

@@ -54,15 +54,19 @@ class Classifier {
 
     Wedge wedge_of(const Ground& ground) const;
     double certify_columns(const Wedge& wedge);
-    void classify_row(ConstDisparityMap map, const Wedge& wedge, GroundUse use, const GroundSurface& surface,
-                      int v, Mask out) const;
-    TerrainClass beyond_range(const Wedge& wedge, int u, int v, double d_px, double rise) const;
+    void make_limits(const Wedge& wedge, GroundUse use, const GroundSurface& surface);
+    void classify_row(ConstDisparityMap map, const Wedge& wedge, int v, Mask out) const;
 
     TerrainConfig config_;
     RectifiedRig rig_;
     int last_disparity_;
     int disparities_;
+    int first_q4_;
+    int bands_;
+    std::size_t table_;                     // entries of one table of limits
     std::span<std::int32_t> certified_q4_;  // per column, the least measured disparity within its range
+    std::span<std::int32_t> up_q20_;        // [band][within, beyond][disparity]
+    std::span<std::int32_t> down_q20_;
     Components components_;
     Outline outline_;
     FixedVector<Thing, kMaxObstacles> things_;

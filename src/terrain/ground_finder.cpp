@@ -15,7 +15,7 @@ constexpr int kUnitsPerPixel = 16;
 constexpr double kNearPx = 1.0;
 constexpr double kInlierPx = 1.5;
 constexpr double kResidualPx = 3.0;
-constexpr int kTallyStep = 2;  // columns; every row is tallied, for its support
+constexpr int kTallyStep = 4;  // columns; every row is tallied, for its support
 constexpr double kRowOffShare = 0.5;
 // Without calibration: focal length over width and baseline over height of real rigs.
 constexpr double kFocalMin = 0.5, kFocalMax = 1.5;
@@ -156,7 +156,8 @@ bool GroundFinder::fit(ConstDisparityMap map, const VDisparity& v_disparity, con
     std::size_t count = 0;
     for (const PlaneFitResult& plane : planes) {
         const auto known = [&](const PlaneFitResult& other) { return nearly_same(plane.plane, other.plane); };
-        if (plane.found && std::none_of(planes.begin(), planes.begin() + static_cast<std::ptrdiff_t>(count), known))
+        if (plane.found &&
+            std::none_of(planes.begin(), planes.begin() + static_cast<std::ptrdiff_t>(count), known))
             planes[count++] = plane;
     }
     std::fill(planes.begin() + static_cast<std::ptrdiff_t>(count), planes.end(), PlaneFitResult{});
@@ -243,7 +244,7 @@ void GroundFinder::tally(ConstDisparityMap map, const DisparityPlane& plane, Par
                 ++row.valid;
                 double residual = disparity[u] * (1.0 / kDisparityOne) - expected;
                 if (!surface_.flat()) {
-                    const double rise = surface_.rise_at(disparity[u], u);
+                    const double rise = surface_.rise(disparity[u]);
                     residual -= rise / (1.0 - rise) * (expected - offset_px_);
                 }
                 const double size = std::fabs(residual);

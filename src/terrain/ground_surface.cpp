@@ -6,7 +6,8 @@
 namespace groundline::terrain {
 namespace {
 
-constexpr int kStep = 2;          // columns and rows
+constexpr int kRowStep = 2;
+constexpr int kColumnStep = 4;
 constexpr int kStepsPerPx = 2;    // up to kFinePx
 constexpr int kFinePx = 32;       // beyond, one step a pixel
 constexpr double kLeastPx = 1.0;  // of ground that is seen
@@ -29,22 +30,25 @@ std::size_t GroundSurface::index_of(int disparity_q4) const {
 
 void GroundSurface::take(Arena& arena, int width, int /*height*/, int min_disparity, int disparities) {
     width_ = width;
+    bands_ = (width + kBandColumns - 1) / kBandColumns;
+    const auto bands = static_cast<std::size_t>(bands_);
     first_q4_ = min_disparity * kDisparityOne;
     step_of_q4_ = arena.take<std::uint16_t>(static_cast<std::size_t>(disparities) * kDisparityOne + 1);
     inverse_px_ = arena.take<double>(step_of_q4_.size());
     const int fine = std::min(disparities, kFinePx);
+    fine_px_ = fine;
     steps_ = fine * kStepsPerPx + (disparities - fine) + 1;
     const auto steps = static_cast<std::size_t>(steps_);
     range_ = arena.take<double>(steps);
-    counts_ = arena.take<std::uint16_t>(steps * kBands * kHeights);
-    totals_ = arena.take<std::uint16_t>(steps * kBands);
+    counts_ = arena.take<std::uint16_t>(steps * bands * kHeights);
+    totals_ = arena.take<std::uint16_t>(steps * bands);
     pooled_ = arena.take<std::int32_t>(steps * kHeights);
     best_ = arena.take<std::int32_t>(steps * kHeights);
     from_ = arena.take<std::int8_t>(steps * kHeights);
     profile_ = arena.take<double>(steps);
     profile_seen_ = arena.take<bool>(steps);
-    rise_ = arena.take<float>(steps * kBands);
-    support_ = arena.take<CellSupport>(steps * kBands);
+    rise_ = arena.take<float>(step_of_q4_.size());
+    support_ = arena.take<CellSupport>(steps * bands);
     for (std::size_t i = 0; i < step_of_q4_.size(); ++i) {
         const int q4 = static_cast<int>(i);
         const int fine_q4 = fine * kDisparityOne;
@@ -61,16 +65,6 @@ void GroundSurface::flatten(CellSupport support) {
     std::fill(support_.begin(), support_.end(), support);
 }
 
-double GroundSurface::rise_at(int disparity_q4, int u) const {
-    if (flat_) return 0.0;
-    const int step = step_of(disparity_q4);
-    // Bands are known in their middle; between them the surface is straight.
-    const double at = std::clamp((u + 0.5) * kBands / width_ - 0.5, 0.0, kBands - 1.0);
-    const int left = std::min(static_cast<int>(at), kBands - 2);
-    const double share = at - left;
-    return (1.0 - share) * rise(step, left) + share * rise(step, left + 1);
-}
-
 void GroundSurface::count(ConstDisparityMap map, const DisparityPlane& plane, double offset_px,
                           double tolerance) {
     height_bin_ = tolerance / kBinsPerTolerance;
@@ -82,17 +76,17 @@ void GroundSurface::count(ConstDisparityMap map, const DisparityPlane& plane, do
     }
     const double per_bin = 1.0 / height_bin_;
     const double zero = kZero + 0.5;
-    for (int v = 0; v < map.height(); v += kStep) {
+    for (int v = 0; v < map.height(); v += kRowStep) {
         const std::int16_t* disparity = map.disparity_q4.row(v);
         const Invalid* invalid = map.invalid.row(v);
         const double at_row = plane.dv * v + plane.d0 - offset_px;
         if (std::max(at_row, at_row + plane.du * map.width()) < kLeastPx) continue;
-        for (int u = 0; u < map.width(); u += kStep) {
+        for (int u = 0; u < map.width(); u += kColumnStep) {
             if (invalid[u] != Invalid::kNone) continue;
             const double ground = plane.du * u + at_row;
             if (ground < kLeastPx) continue;
             const std::size_t index = index_of(disparity[u]);
-            const std::size_t at = cell(step_of_q4_[index], u * kBands / width_);
+            const std::size_t at = cell(step_of_q4_[index], u / kBandColumns);
             ++totals_[at];
             const double bin = (1.0 - ground * inverse_px_[index]) * per_bin + zero;
             if (bin >= 0.0 && bin < kHeights) ++counts_[at * kHeights + static_cast<std::size_t>(bin)];
@@ -104,13 +98,13 @@ void GroundSurface::count(ConstDisparityMap map, const DisparityPlane& plane, do
 // than the plane does.
 bool GroundSurface::trace_profile(double per_row_px) {
     // Ground across the whole view would put so many pixels into half a pixel of disparity.
-    const double full = 0.5 / kStepsPerPx * 2.0 / per_row_px / kStep * (width_ / kStep);
+    const double full = 0.5 / kStepsPerPx * 2.0 / per_row_px / kRowStep * (width_ / kColumnStep);
     const auto cap = static_cast<std::int32_t>(std::max(16.0, 0.5 * full));
     for (std::size_t step = 0; step < static_cast<std::size_t>(steps_); ++step)
         for (std::size_t j = 0; j < kHeights; ++j) {
             std::int32_t sum = 0;
-            for (std::size_t band = 0; band < kBands; ++band)
-                sum += counts_[(step * kBands + band) * kHeights + j];
+            for (std::size_t band = 0; band < static_cast<std::size_t>(bands_); ++band)
+                sum += counts_[(step * static_cast<std::size_t>(bands_) + band) * kHeights + j];
             pooled_[step * kHeights + j] = sum;
         }
     std::int64_t on_plane = 0;
@@ -241,21 +235,18 @@ void GroundSurface::cut_behind_lip(double per_row_px) {
     }
 }
 
-int GroundSurface::level_of(std::size_t at) const {
-    return kZero + static_cast<int>(std::floor(rise_[at] / static_cast<float>(height_bin_) + 0.5F));
-}
-
 void GroundSurface::judge_cells() {
-    for (int step = 0; step < steps_; ++step)
-        for (int band = 0; band < kBands; ++band) {
+    for (int step = 0; step < steps_; ++step) {
+        const double height = flat_ ? 0.0 : profile_[static_cast<std::size_t>(step)];
+        const int level = kZero + static_cast<int>(std::floor(height + 0.5));
+        for (int band = 0; band < bands_; ++band) {
             const std::size_t at = cell(step, band);
             const std::uint16_t* counts = &counts_[at * kHeights];
-            const int level = level_of(at);
             int near = 0;
             int about = 0;
             for (int j = 0; j < kHeights; ++j) {
                 about += counts[j];
-                if (std::abs(j - level) <= 3) near += counts[j];
+                near += std::abs(j - level) <= 3 ? counts[j] : 0;
             }
             const bool supported = near >= 3 && 10 * near >= totals_[at];
             const bool elsewhere = about >= 12 && 10 * near < about;
@@ -263,6 +254,7 @@ void GroundSurface::judge_cells() {
                            : elsewhere ? CellSupport::kContradicted
                                        : CellSupport::kNone;
         }
+    }
 }
 
 void GroundSurface::find(ConstDisparityMap map, const DisparityPlane& plane, double offset_px,
@@ -286,8 +278,18 @@ void GroundSurface::find(ConstDisparityMap map, const DisparityPlane& plane, dou
 
 void GroundSurface::settle(double per_row_px) {
     if (!flat_) cut_behind_lip(per_row_px);
-    for (std::size_t at = 0; at < rise_.size() && !flat_; ++at)
-        rise_[at] = static_cast<float>(height_bin_ * profile_[at / kBands]);
+    // Steps are known in their middle; between them the surface is straight.
+    for (std::size_t i = 0; i < rise_.size() && !flat_; ++i) {
+        const int step = step_of_q4_[i];
+        const double px = static_cast<double>(i) / kDisparityOne;
+        const double wide = px < fine_px_ ? 1.0 / kStepsPerPx : 1.0;
+        const double from_middle = (px - wide * std::floor(px / wide)) / wide - 0.5;
+        const int other = std::clamp(from_middle < 0.0 ? step - 1 : step + 1, 0, steps_ - 1);
+        const double share = std::fabs(from_middle);
+        rise_[i] =
+            static_cast<float>(height_bin_ * ((1.0 - share) * profile_[static_cast<std::size_t>(step)] +
+                                              share * profile_[static_cast<std::size_t>(other)]));
+    }
     judge_cells();
 }
 

@@ -1,4 +1,4 @@
-// The ground's shape about its plane: waves along the way and banks across it, as far as pixels show them.
+// The ground's shape about its plane: its heights and depths along the way, as far as pixels show them.
 #pragma once
 
 #include <cstdint>
@@ -19,23 +19,22 @@ enum class CellSupport : std::uint8_t {
 };
 
 // Heights are shares of the camera's height over the plane, ranges multiples of it, so that both hold without
-// calibration. Cells are steps of disparity (half a pixel, about four rows of ground each) times kBands
+// calibration. Cells are steps of disparity (half a pixel, about four rows of ground each) times kBandColumns
 // columns of the picture.
 //
-// Found from a histogram of heights in each cell: first one profile over the range for all columns, the path
-// through the cells that holds most pixels, has least beneath it and is nowhere steeper than kMaxSlope
-// (dynamic programming; an upright face has one range, so no path climbs it). Then, from near to far, what
-// each band is off that profile, its slope across limited alike. Where the plane holds as much as the
-// profile, the surface is the plane itself.
+// Found from a histogram of heights in each cell: the path from near to far, one height a step, that holds
+// most pixels of all columns, has least beneath it and is nowhere steeper than kMaxSlope (dynamic
+// programming; an upright face has one range, so no path climbs it). Where the plane holds as much as the
+// path, the surface is the plane itself.
 class GroundSurface {
   public:
-    static constexpr int kBands = 12;
+    static constexpr int kBandColumns = 64;
     static constexpr double kMaxSlope = 0.25;
 
     // Disparities searched as in GroundFinder.
     void take(Arena& arena, int width, int height, int min_disparity, int disparities);
 
-    // Uses every second pixel of every second row. `offset_px` is measured minus true disparity, `focal_px`
+    // Uses every fourth pixel of every second row. `offset_px` is measured minus true disparity, `focal_px`
     // need only be about right, tolerance is a share of the camera's height.
     void find(ConstDisparityMap map, const DisparityPlane& plane, double offset_px, double focal_px,
               double tolerance, Parallel& parallel);
@@ -51,30 +50,29 @@ class GroundSurface {
     // Cell row of a measured disparity.
     int step_of(int disparity_q4) const { return step_of_q4_[index_of(disparity_q4)]; }
     int steps() const { return steps_; }
-    // Of the surface above the plane, at the middle of a band.
-    double rise(int step, int band) const { return rise_[cell(step, band)]; }
-    double rise_at(int disparity_q4, int u) const;
-    CellSupport support(int disparity_q4, int u) const {
-        return support_[cell(step_of(disparity_q4), u * kBands / width_)];
+    int bands() const { return bands_; }
+    // Of the surface above the plane.
+    double rise(int disparity_q4) const {
+        return flat_ ? 0.0 : static_cast<double>(rise_[index_of(disparity_q4)]);
     }
+    CellSupport support(int step, int band) const { return support_[cell(step, band)]; }
 
   private:
     static constexpr int kHeights = 48;  // bins of a sixth of the tolerance
     static constexpr int kZero = kHeights / 2;
 
-    std::size_t cell(int step, int band) const {
-        return static_cast<std::size_t>(step) * kBands + static_cast<std::size_t>(band);
-    }
+    std::size_t cell(int step, int band) const { return static_cast<std::size_t>(step * bands_ + band); }
     std::size_t index_of(int disparity_q4) const;
     void count(ConstDisparityMap map, const DisparityPlane& plane, double offset_px, double tolerance);
     bool trace_profile(double per_row_px);
-    int level_of(std::size_t cell) const;
     void cut_behind_lip(double per_row_px);
     void judge_cells();
 
+    int bands_ = 1;
     int width_ = 0;
     int first_q4_ = 0;
     int steps_ = 0;
+    int fine_px_ = 0;  // below, two steps a pixel
     bool flat_ = true;
     double height_bin_ = 0.0;
     double focal_times_normal_ = 0.0;  // f N, N the length of the plane's normal in disparity: Z/h = f N / d
@@ -88,7 +86,7 @@ class GroundSurface {
     std::span<std::int8_t> from_;      // [step][height] where it came from, in height bins
     std::span<double> profile_;        // [step], in height bins from kZero
     std::span<bool> profile_seen_;
-    std::span<float> rise_;
+    std::span<float> rise_;  // by measured disparity
     std::span<CellSupport> support_;
 };
 

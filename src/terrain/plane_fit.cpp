@@ -9,7 +9,7 @@ namespace {
 constexpr std::size_t kThin = 4500;
 constexpr std::size_t kDense = 60000;
 constexpr std::size_t kPart = 8192;  // samples summed by one task
-constexpr int kTile = 32;       // px, wider than any matching window's reach
+constexpr int kTile = 32;            // px, wider than any matching window's reach
 // What matching windows and sub-pixel estimates have in common over a picture, and from its middle to its
 // border: no statistic of one frame can see it. Chosen so that over 60 rendered frames (flat ground, boxes,
 // poles, clutter, low texture) the paper's matcher errs by less than 2 sigma in pitch, height and roll in 98
@@ -105,7 +105,8 @@ void PlaneFit::sample(ConstDisparityMap map, double offset_px) {
         thin_.add(u - middle_u, v - middle_v, d_px);
         if (u / thin_step_ % 2 == 0 && v / thin_step_ % 2 == 0) rough_.add(u - middle_u, v - middle_v, d_px);
     });
-    each(0, step_u_, step_v_, [&](int u, int v, float d_px) { dense_.add(u - middle_u, v - middle_v, d_px); });
+    each(0, step_u_, step_v_,
+         [&](int u, int v, float d_px) { dense_.add(u - middle_u, v - middle_v, d_px); });
     rough_.fill_up();
     thin_.fill_up();
     dense_.fill_up();
@@ -175,8 +176,8 @@ PlaneFitResult PlaneFit::fit(const DisparityPlane& start, Parallel& parallel) {
         const kernels::PlaneWeights weights = weights_of(plane, tolerance);
         parallel.for_each(parts, [&](int part, int) {
             const std::size_t first = static_cast<std::size_t>(part) * kPart;
-            parts_[static_cast<std::size_t>(part)] = kernels::plane_moments(
-                dense_.samples(first, std::min(kPart, dense_.used - first)), weights);
+            parts_[static_cast<std::size_t>(part)] =
+                kernels::plane_moments(dense_.samples(first, std::min(kPart, dense_.used - first)), weights);
         });
         moments = {};
         for (std::size_t part = 0; part < static_cast<std::size_t>(parts); ++part)

@@ -9,6 +9,7 @@ namespace {
 
 constexpr int kBinsPerPx = 4;
 constexpr int kStepsPerBin = kDisparityOne / kBinsPerPx;
+constexpr int kColumnStep = 2;
 constexpr int kUnits = 16;
 
 }  // namespace
@@ -27,19 +28,19 @@ void build_v_disparity(ConstDisparityMap map, VDisparity& out, Parallel& paralle
     const int bins = out.histogram.width;
     const int end_q4 = (bins - 1) * kStepsPerBin;
     // A row of up to 4095 pixels cannot exceed 16 bits even when all fall into one bin.
-    const bool may_saturate = map.width() * kUnits > 65535;
+    const bool may_saturate = (map.width() + 1) * kUnits > 65535;
     parallel.for_each(map.height(), [&](int v, int) {
         const std::int16_t* disparity = map.disparity_q4.row(v);
         const Invalid* invalid = map.invalid.row(v);
         std::uint16_t* cells = out.histogram.row(v);
         std::fill_n(cells, bins, std::uint16_t{0});
-        for (int u = 0; u < map.width(); ++u) {
+        for (int u = 0; u < map.width(); u += kColumnStep) {
             if (invalid[u] != Invalid::kNone) continue;
             const int above = disparity[u] - first_q4;
             if (above < 0 || above > end_q4) continue;
             const int bin = above / kStepsPerBin;
-            const int upper = (above % kStepsPerBin) * (kUnits / kStepsPerBin);
-            const int lower = kUnits - upper;
+            const int upper = (above % kStepsPerBin) * (kColumnStep * kUnits / kStepsPerBin);
+            const int lower = kColumnStep * kUnits - upper;
             if (may_saturate) {
                 cells[bin] = static_cast<std::uint16_t>(std::min(cells[bin] + lower, 65535));
                 if (upper > 0)

@@ -146,6 +146,23 @@ class Reference {
         return std::max(1.0, plane.at(u, near) - offset_);
     }
 
+    // Deviation of a disparity from the ground's, at the corner of the pixel's band of 64 columns where the
+    // ground's is least certain.
+    double worst_px(int u) const {
+        const int first = u / 64 * 64;
+        double worst = 0.0;
+        for (const double x : {1.0 * first, std::min(first + 64.0, 1.0 * rig_.width) - 1.0})
+            for (const double y : {0.0, rig_.height - 1.0}) {
+                const double at[3] = {x, y, 1.0};
+                double variance = config_.sigma_disparity_px * config_.sigma_disparity_px;
+                for (int i = 0; i < 3; ++i)
+                    for (int j = 0; j < 3; ++j)
+                        variance += at[i] * ground_.covariance[static_cast<std::size_t>(3 * i + j)] * at[j];
+                worst = std::max(worst, variance);
+            }
+        return std::sqrt(worst);
+    }
+
     // The class, and whether a rounding could turn it.
     TerrainClass judge(int u, int v, double measured_px, double certified, bool& close) const {
         const double d_px = measured_px - offset_;
@@ -155,7 +172,7 @@ class Reference {
         const double unit = rig_.calibrated ? ground_.pose.height_m : 1.0;
         if (std::fabs(h - up_) < 1e-5 * unit || std::fabs(h + down_) < 1e-5 * unit) close = true;
         if (d_px < certified) {
-            const double limit = std::max(up_, config_.sigmas * sigma(u, v, d_px));
+            const double limit = std::max(up_, config_.sigmas * worst_px(u) / d_px * unit);
             if (std::fabs(h - limit) < 1e-4 * std::fabs(limit)) close = true;
             return h > limit ? TerrainClass::kObstacle : TerrainClass::kUnknown;
         }

@@ -20,26 +20,26 @@ struct Fixture {
     int at(int bin, int row) const { return v_disparity.histogram.at(bin, row); }
 };
 
-TEST(VDisparity, SplatsSixteenUnitsBetweenTheTwoNearestBins) {
+TEST(VDisparity, SplatsThirtyTwoUnitsBetweenTheTwoNearestBins) {
     Fixture f(8, 4, 0, 16);
     for (int v = 0; v < 4; ++v)
         for (int u = 0; u < 8; ++u)
             f.map.invalid.at(u, v) = Invalid::kTexture;
-    f.map.invalid.at(3, 1) = Invalid::kNone;
-    f.map.disparity_q4.at(3, 1) = 5 * 16 + 7;  // bin 21 holds 84..88: 84 + 3
+    f.map.invalid.at(2, 1) = Invalid::kNone;
+    f.map.disparity_q4.at(2, 1) = 5 * 16 + 7;  // bin 21 holds 84..88: 84 + 3
     f.map.invalid.at(4, 2) = Invalid::kNone;   // disparity 0 is a value like any other
     build_v_disparity(f.map, f.v_disparity, f.serial);
-    EXPECT_EQ(f.at(21, 1), 4);
-    EXPECT_EQ(f.at(22, 1), 12);
-    EXPECT_EQ(f.at(0, 2), 16);
+    EXPECT_EQ(f.at(21, 1), 8);
+    EXPECT_EQ(f.at(22, 1), 24);
+    EXPECT_EQ(f.at(0, 2), 32);
     int total = 0;
     for (int v = 0; v < 4; ++v)
         for (int k = 0; k < f.v_disparity.histogram.width; ++k)
             total += f.at(k, v);
-    EXPECT_EQ(total, 32);
+    EXPECT_EQ(total, 64);
 }
 
-TEST(VDisparity, EveryRowHoldsSixteenUnitsForEachValidPixelInRange) {
+TEST(VDisparity, EveryRowHoldsItsValidPixelsInRange) {
     constexpr int kMin = 8;
     constexpr int kCount = 24;
     Fixture f(61, 37, kMin, kCount);
@@ -52,7 +52,7 @@ TEST(VDisparity, EveryRowHoldsSixteenUnitsForEachValidPixelInRange) {
             f.map.disparity_q4.at(u, v) = static_cast<std::int16_t>(d_q4);
             f.map.invalid.at(u, v) = valid ? Invalid::kNone : Invalid::kLeftRight;
             const bool inside = d_q4 >= kMin * 16 && d_q4 <= (kMin + kCount) * 16;
-            expected[static_cast<std::size_t>(v)] += valid && inside ? 16 : 0;
+            expected[static_cast<std::size_t>(v)] += valid && inside && u % 2 == 0 ? 32 : 0;
         }
     // What an earlier frame left must go.
     fill_pixels(f.v_disparity.histogram, 77);
@@ -65,10 +65,10 @@ TEST(VDisparity, EveryRowHoldsSixteenUnitsForEachValidPixelInRange) {
             total += f.at(k, v);
             moment += f.at(k, v) / 16.0 * (kMin + 0.25 * k);
         }
-        for (int u = 0; u < 61; ++u) {
+        for (int u = 0; u < 61; u += 2) {
             const int d_q4 = f.map.disparity_q4.at(u, v);
             if (f.map.invalid.at(u, v) == Invalid::kNone && d_q4 >= kMin * 16 && d_q4 <= (kMin + kCount) * 16)
-                truth += d_q4 / 16.0;
+                truth += 2.0 * d_q4 / 16.0;
         }
         EXPECT_EQ(total, expected[static_cast<std::size_t>(v)]);
         // A bilinear splat keeps the mean: the sum of disparities is exact.

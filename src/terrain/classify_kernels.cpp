@@ -1,0 +1,89 @@
+#include "terrain/classify_kernels.hpp"
+
+#include <algorithm>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "terrain/classify_kernels.cpp"
+#include <hwy/foreach_target.h>  // NOLINT(misc-header-include-cycle): includes this file once per unit
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace groundline::terrain::kernels::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using D = hn::CappedTag<std::int32_t, 16>;
+using V = hn::Vec<D>;
+constexpr int kLanes = static_cast<int>(hn::MaxLanes(D()));
+using D16 = hn::Rebind<std::int16_t, D>;
+using D8 = hn::Rebind<std::uint8_t, D>;
+
+HWY_INLINE V Class(TerrainClass kind) {
+    return hn::Set(D(), static_cast<std::int32_t>(kind));
+}
+
+void ClassifyAny(const ClassRow& row, const ClassLimits& limits, std::uint8_t* out) {
+    const D d;
+    const D16 d16;
+    const D8 d8;
+    const auto* const invalid = reinterpret_cast<const std::uint8_t*>(row.invalid);
+    const V step = hn::Set(d, row.ground_step_q20 * kLanes);
+    V ground = hn::Add(hn::Set(d, row.ground_q20), hn::Mul(hn::Iota(d, 0), hn::Set(d, row.ground_step_q20)));
+    const V first = hn::Set(d, row.first_q4);
+    const V last_index = hn::Set(d, limits.size - 1);
+    const V size = hn::Set(d, limits.size);
+    const V one = hn::Set(d, 1);
+    const V last = hn::Set(d, row.last_q20);
+    const V edge = hn::Set(d, static_cast<std::int32_t>(Invalid::kRangeEdge));
+    for (int u = 0; u < row.count; u += kLanes) {
+        const V disparity = hn::PromoteTo(d, hn::LoadU(d16, row.disparity_q4 + u));
+        const V reason = hn::PromoteTo(d, hn::LoadU(d8, invalid + u));
+        const auto beyond = hn::Lt(disparity, hn::LoadU(d, row.certified_q4 + u));
+        V index = hn::Min(hn::Max(hn::Sub(disparity, first), hn::Zero(d)), last_index);
+        index = hn::Add(index, hn::IfThenElseZero(beyond, size));
+        const V up = hn::GatherIndex(d, limits.up_q20, index);
+        const V down = hn::GatherIndex(d, limits.down_q20, index);
+        V kind = hn::And(down, one);  // kTraversable is 1
+        kind = hn::IfThenElseZero(hn::Gt(ground, hn::Zero(d)), kind);
+        kind = hn::IfThenElse(hn::Gt(ground, down), Class(TerrainClass::kDrop), kind);
+        kind = hn::IfThenElse(hn::Lt(ground, up), Class(TerrainClass::kObstacle), kind);
+        const V nearer = hn::IfThenElseZero(hn::And(hn::Eq(reason, edge), hn::Lt(ground, last)),
+                                            Class(TerrainClass::kObstacle));
+        kind = hn::IfThenElse(hn::Eq(reason, hn::Zero(d)), kind, nearer);
+        hn::StoreU(hn::DemoteTo(d8, kind), d8, out + u);
+        ground = hn::Add(ground, step);
+    }
+}
+
+}  // namespace groundline::terrain::kernels::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace groundline::terrain::kernels {
+
+HWY_EXPORT(ClassifyAny);
+
+void classify_columns(const ClassRow& row, const ClassLimits& limits, TerrainClass* out) {
+    HWY_DYNAMIC_DISPATCH(ClassifyAny)(row, limits, reinterpret_cast<std::uint8_t*>(out));
+}
+
+void classify_columns_plain(const ClassRow& row, const ClassLimits& limits, TerrainClass* out) {
+    for (int u = 0; u < row.count; ++u) {
+        const std::int32_t ground = row.ground_q20 + u * row.ground_step_q20;
+        if (row.invalid[u] != Invalid::kNone) {
+            const bool nearer = row.invalid[u] == Invalid::kRangeEdge && ground < row.last_q20;
+            out[u] = nearer ? TerrainClass::kObstacle : TerrainClass::kUnknown;
+            continue;
+        }
+        const std::int32_t disparity = row.disparity_q4[u];
+        const std::int32_t index = std::clamp(disparity - row.first_q4, 0, limits.size - 1) +
+                                   (disparity < row.certified_q4[u] ? limits.size : 0);
+        const bool level = (limits.down_q20[index] & 1) != 0 && ground > 0;
+        out[u] = ground < limits.up_q20[index]     ? TerrainClass::kObstacle
+                 : ground > limits.down_q20[index] ? TerrainClass::kDrop
+                 : level                           ? TerrainClass::kTraversable
+                                                   : TerrainClass::kUnknown;
+    }
+}
+
+}  // namespace groundline::terrain::kernels
+#endif
