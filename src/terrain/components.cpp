@@ -1,32 +1,112 @@
 #include "terrain/components.hpp"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cassert>
 #include <cstdlib>
+#include <cstring>
+#include <limits>
 
 namespace groundline::terrain {
 namespace {
+
+constexpr int kBlock = 64;  // pixels of a row that are looked at together: a bit each in a word
 
 // |delta d| <= 1 px + 0.02 d, in sixteenths and without division.
 bool connected(int a_q4, int b_q4) {
     return 50 * std::abs(a_q4 - b_q4) <= 50 * kDisparityOne + std::max(a_q4, b_q4);
 }
 
+// 1 where they are not connected; 16 bits throughout, for the compiler's vectors. Beyond 700 sixteenths only
+// disparities of 2000 px would connect.
+std::uint16_t are_apart(std::int16_t a, std::int16_t b) {
+    const std::int16_t nearer = a > b ? a : b;
+    const std::int16_t farther = a > b ? b : a;
+    std::uint16_t step = static_cast<std::uint16_t>(nearer - farther);
+    step = step < 700 ? step : std::uint16_t{700};
+    const std::int16_t low = nearer > -801 ? nearer : std::int16_t{-801};
+    const auto reach = static_cast<std::uint16_t>(low + 801);
+    return static_cast<std::uint16_t>(step * 50) >= reach ? 1 : 0;
+}
+
 bool is_thing(TerrainClass kind) {
     return kind == TerrainClass::kObstacle || kind == TerrainClass::kDrop;
 }
 
-// A row's disparities with range-edge pixels in their place.
-struct RowOfDisparity {
-    const std::int16_t* disparity;
-    const Invalid* invalid;
-    int range_edge_q4;
-    int operator[](int u) const { return invalid[u] == Invalid::kRangeEdge ? range_edge_q4 : disparity[u]; }
-};
-
-RowOfDisparity row_of(ConstDisparityMap map, int v, int range_edge_q4) {
-    return {map.disparity_q4.row(v), map.invalid.row(v), range_edge_q4};
+// The first in the lowest byte.
+std::uint64_t eight_bytes(const std::uint8_t* bytes) {
+    static_assert(std::endian::native == std::endian::little);
+    std::uint64_t word;
+    std::memcpy(&word, bytes, sizeof word);
+    return word;
 }
+
+// kBlock pixels of a row, and at [0] the pixel before them. Loops of fixed length in memory of its own, for
+// the compiler's vectors.
+class Block {
+  public:
+    // Goes on to the next pixels. Returns whether one of them is of class 2 or 3.
+    bool next(const TerrainClass* kinds, int pixels) {
+        static_assert(static_cast<int>(TerrainClass::kObstacle) == 2 &&
+                      static_cast<int>(TerrainClass::kDrop) == 3);
+        kind_[0] = kind_[kBlock];
+        depth_[0] = depth_[kBlock];
+        kind_[kBlock] = 0;
+        std::uint64_t any = 0;
+        if (pixels == kBlock) {
+            const auto* bytes = reinterpret_cast<const std::uint8_t*>(kinds);
+            for (int i = 0; i < kBlock; i += 8)
+                any |= eight_bytes(bytes + i);
+            if ((any & 0x0202020202020202U) == 0) return false;
+        } else {
+            std::fill(kind_.begin() + 1, kind_.end(), std::uint8_t{0});
+        }
+        std::memcpy(&kind_[1], kinds, static_cast<std::size_t>(pixels));
+        return true;
+    }
+
+    // Their disparities, range-edge pixels in their place, into `depths`.
+    void take_depths(const std::int16_t* measured_q4, const Invalid* invalid, int range_edge_q4, int first_q4,
+                     int last_q4, int pixels, std::int16_t* depths) {
+        std::array<std::uint8_t, kBlock> reason{};
+        std::memcpy(reason.data(), invalid, static_cast<std::size_t>(pixels));
+        std::copy_n(measured_q4, pixels, &depth_[1]);
+        const auto edge = static_cast<std::int16_t>(range_edge_q4);
+        const auto least = static_cast<std::int16_t>(first_q4);
+        const auto most = static_cast<std::int16_t>(last_q4);
+        for (std::size_t i = 0; i < kBlock; ++i) {
+            std::int16_t depth = depth_[i + 1];
+            depth = reason[i] == static_cast<std::uint8_t>(Invalid::kRangeEdge) ? edge : depth;
+            depth = depth > least ? depth : least;
+            depth_[i + 1] = depth < most ? depth : most;
+        }
+        std::copy_n(&depth_[1], pixels, depths);
+    }
+
+    // A bit for each pixel, set where it or the pixel before it is of class 2 or 3 and the two do not belong
+    // to one run.
+    std::uint64_t breaks() const {
+        std::array<std::uint16_t, kBlock> apart;
+        for (std::size_t i = 0; i < kBlock; ++i)
+            apart[i] = are_apart(depth_[i], depth_[i + 1]);
+        std::array<std::uint8_t, kBlock> bytes;
+        for (std::size_t i = 0; i < kBlock; ++i) {
+            const auto differ = static_cast<std::uint8_t>(kind_[i] != kind_[i + 1] ? 1 : 0);
+            const auto things = static_cast<std::uint8_t>((kind_[i] | kind_[i + 1]) >> 1U);
+            bytes[i] = static_cast<std::uint8_t>((apart[i] | differ) & things);
+        }
+        std::uint64_t bits = 0;
+        // Byte k is moved to bit 56 + k; no two partial products meet.
+        for (std::size_t i = 0; i < kBlock; i += 8)
+            bits |= (eight_bytes(&bytes[i]) * 0x0102040810204080U >> 56U) << i;
+        return bits;
+    }
+
+  private:
+    std::array<std::uint8_t, kBlock + 1> kind_{};
+    std::array<std::int16_t, kBlock + 1> depth_{};
+};
 
 }  // namespace
 
@@ -34,107 +114,156 @@ void Components::take(Arena& arena, int width, int height, int min_disparity, in
                       int min_pixels) {
     const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
     first_q4_ = min_disparity * kDisparityOne;
-    labels_ = arena.image<std::int32_t>(width, height);
+    depths_ = arena.image<std::int16_t>(width, height);
     runs_ = arena.take<Run>(pixels);
+    first_run_ = arena.take<std::int32_t>(static_cast<std::size_t>(height) + 1);
     stats_ = arena.take<Stats>(pixels / static_cast<std::size_t>(std::max(1, min_pixels)) + 1);
     chosen_ = arena.take<std::int32_t>(stats_.size());
-    inverse_px_ = arena.take<double>(static_cast<std::size_t>(disparities) * kDisparityOne + 1);
+    across_ = arena.take<double>(static_cast<std::size_t>(width));
+    weights_ = arena.take<Weight>(static_cast<std::size_t>(disparities) * kDisparityOne + 1);
     bins_ = disparities * kBinsPerPx + 1;
-    histograms_ = arena.take<std::uint32_t>(kMaxObstacles * static_cast<std::size_t>(bins_));
+    histograms_ = arena.take<std::uint32_t>(kMaxObstacles * static_cast<std::size_t>(bins_) * kWays);
 }
 
 std::int32_t Components::root_of(std::int32_t run) {
-    while (runs_[static_cast<std::size_t>(run)].parent != run) {
-        Run& here = runs_[static_cast<std::size_t>(run)];
-        here.parent = runs_[static_cast<std::size_t>(here.parent)].parent;
+    while (at(run).parent != run) {
+        Run& here = at(run);
+        here.parent = at(here.parent).parent;
         run = here.parent;
     }
     return run;
 }
 
+// The root of a thing is its first run, so that things are numbered as the rows meet them.
 void Components::join(std::int32_t a, std::int32_t b) {
     a = root_of(a);
     b = root_of(b);
-    if (a == b) return;
-    if (runs_[static_cast<std::size_t>(a)].pixels < runs_[static_cast<std::size_t>(b)].pixels)
-        std::swap(a, b);
-    runs_[static_cast<std::size_t>(b)].parent = a;
-    runs_[static_cast<std::size_t>(a)].pixels += runs_[static_cast<std::size_t>(b)].pixels;
+    at(std::max(a, b)).parent = std::min(a, b);
 }
 
-std::size_t Components::index_of(int measured_q4) const {
-    const int last = static_cast<int>(inverse_px_.size()) - 1;
-    return static_cast<std::size_t>(std::clamp(measured_q4 - first_q4_, 0, last));
-}
-
-int Components::label(ConstDisparityMap map, int range_edge_q4, ConstMask mask) {
+// Appends the runs of row v: pixels of one class, each connected to the next.
+void Components::find_runs(ConstDisparityMap map, int range_edge_q4, ConstMask mask, int v) {
     const int width = map.width();
-    std::int32_t count = 0;
-    for (int v = 0; v < map.height(); ++v) {
-        const TerrainClass* kinds = mask.row(v);
-        const RowOfDisparity d = row_of(map, v, range_edge_q4);
-        std::int32_t* labels = labels_.row(v);
-        for (int u = 0; u < width; ++u) {
-            if (!is_thing(kinds[u])) {
-                labels[u] = kNone;
-                continue;
-            }
-            const bool continues =
-                u > 0 && labels[u - 1] != kNone && kinds[u - 1] == kinds[u] && connected(d[u - 1], d[u]);
-            if (!continues) {
-                runs_[static_cast<std::size_t>(count)] = {count, 0};
-                ++count;
-            }
-            labels[u] = count - 1;
-            ++runs_[static_cast<std::size_t>(count - 1)].pixels;
+    const TerrainClass* kinds = mask.row(v);
+    std::int16_t* depths = depths_.row(v);
+    std::int32_t count = first_run_[static_cast<std::size_t>(v)];
+    bool open = false;  // whether pixel u - 1 lies in a run
+    Block block;
+    for (int first = 0; first < width; first += kBlock) {
+        const int pixels = std::min(kBlock, width - first);
+        std::uint64_t breaks = open ? 1U : 0U;
+        if (block.next(kinds + first, pixels)) {
+            block.take_depths(map.disparity_q4.row(v) + first, map.invalid.row(v) + first, range_edge_q4,
+                              first_q4_, first_q4_ + static_cast<int>(weights_.size()) - 1, pixels,
+                              depths + first);
+            breaks = block.breaks();
         }
-        if (v == 0) continue;
-        const TerrainClass* kinds_above = mask.row(v - 1);
-        const RowOfDisparity d_above = row_of(map, v - 1, range_edge_q4);
-        const std::int32_t* labels_above = labels_.row(v - 1);
-        std::int32_t joined = kNone;  // run above that this run was joined to last
-        std::int32_t run = kNone;
-        for (int u = 0; u < width; ++u) {
-            if (labels[u] == kNone) continue;
-            if (labels[u] != run) joined = kNone;
-            run = labels[u];
-            for (int w = std::max(0, u - 1); w <= std::min(width - 1, u + 1); ++w) {
-                if (labels_above[w] == kNone || labels_above[w] == joined) continue;
-                if (kinds_above[w] != kinds[u] || !connected(d_above[w], d[u])) continue;
-                joined = labels_above[w];
-                join(joined, run);
+        for (; breaks != 0; breaks &= breaks - 1) {
+            const int u = first + std::countr_zero(breaks);
+            if (open) at(count - 1).right = u - 1;
+            open = u < width && is_thing(kinds[u]);
+            if (open) {
+                at(count) = {count, 0, u, u};
+                ++count;
             }
         }
     }
-    return count;
+    if (open) at(count - 1).right = width - 1;
+    first_run_[static_cast<std::size_t>(v) + 1] = count;
 }
 
-void Components::measure(ConstDisparityMap map, const ThingRules& rules, ConstMask mask) {
-    for (int v = 0; v < map.height(); ++v) {
-        const RowOfDisparity d = row_of(map, v, rules.range_edge_q4);
-        const std::int32_t* labels = labels_.row(v);
-        const double at_row = rules.ground.dv * v + rules.ground.d0;
-        for (int u = 0; u < map.width(); ++u) {
-            if (labels[u] == kNone) continue;
-            const Run& run = runs_[static_cast<std::size_t>(labels[u])];
-            const std::int32_t number = runs_[static_cast<std::size_t>(run.parent)].pixels;
-            if (number == kNone) continue;
-            Stats& stats = stats_[static_cast<std::size_t>(number)];
-            if (stats.pixels == 0) {
-                stats.left = stats.right = u;
-                stats.top = v;
-                stats.kind = mask.at(u, v);
-            }
-            stats.left = std::min(stats.left, u);
-            stats.right = std::max(stats.right, u);
-            stats.bottom = v;
-            ++stats.pixels;
-            stats.sum_q4 += d[u];
-            const double inverse_px = inverse_px_[index_of(d[u])];
-            stats.area += rules.unit_px * inverse_px * rules.unit_px * inverse_px;
-            // H/h < clearance
-            if (1.0 - (rules.ground.du * u + at_row) * inverse_px < rules.clearance) stats.low = true;
+// Whether a pixel of `one` and a neighbour of it in `above` are connected.
+bool Components::touch(const Run& one, const Run& above, int v) const {
+    const std::int16_t* d = depths_.row(v);
+    const std::int16_t* d_above = depths_.row(v - 1);
+    for (int u = std::max(one.left, above.left - 1); u <= std::min(one.right, above.right + 1); ++u)
+        for (int w = std::max(above.left, u - 1); w <= std::min(above.right, u + 1); ++w)
+            if (connected(d[u], d_above[w])) return true;
+    return false;
+}
+
+// Joins the runs of row v to those of the row above.
+void Components::join_rows(ConstMask mask, int v) {
+    const TerrainClass* kinds = mask.row(v);
+    const TerrainClass* kinds_above = mask.row(v - 1);
+    std::int32_t above = first_run_[static_cast<std::size_t>(v) - 1];
+    const std::int32_t begin = first_run_[static_cast<std::size_t>(v)];
+    const std::int32_t end = first_run_[static_cast<std::size_t>(v) + 1];
+    for (std::int32_t i = begin; i < end; ++i) {
+        const Run run = at(i);
+        while (above < begin && at(above).right < run.left - 1)
+            ++above;
+        for (std::int32_t j = above; j < begin && at(j).left <= run.right + 1; ++j) {
+            const Run& other = at(j);
+            if (kinds[run.left] == kinds_above[other.left] && touch(run, other, v)) join(i, j);
         }
+    }
+}
+
+// Roots with enough pixels get a number; every run gets that of its thing, kNone where it is too small.
+void Components::number_things(int least) {
+    const std::int32_t runs = first_run_[first_run_.size() - 1];
+    for (std::int32_t i = 0; i < runs; ++i) {
+        at(i).parent = root_of(i);
+        at(at(i).parent).pixels += at(i).right - at(i).left + 1;
+    }
+    thing_count_ = 0;
+    for (std::int32_t i = 0; i < runs; ++i) {
+        Run& run = at(i);
+        // A root stands before its other runs, and its number takes the place of its pixels.
+        if (run.parent == i)
+            run.pixels = run.pixels >= least && thing_count_ < static_cast<int>(stats_.size())
+                             ? thing_count_++
+                             : kNone;
+        else
+            run.pixels = at(run.parent).pixels;
+    }
+}
+
+void Components::measure(const ThingRules& rules, Mask mask) {
+    for (int i = 0; i < thing_count_; ++i)
+        stats_[static_cast<std::size_t>(i)] = {};
+    for (int u = 0; u < depths_.width; ++u)
+        across_[static_cast<std::size_t>(u)] = rules.ground.du * u;
+    for (int v = 0; v < depths_.height; ++v) {
+        const double at_row = rules.ground.dv * v + rules.ground.d0;
+        const std::int16_t* d = depths_.row(v);
+        TerrainClass* kinds = mask.row(v);
+        for_each_run(v, [&](const Run& run) {
+            if (run.pixels == kNone) {
+                std::fill(kinds + run.left, kinds + run.right + 1, TerrainClass::kUnknown);
+                return;
+            }
+            std::int64_t sum_q4 = 0;
+            std::uint64_t area = 0;
+            double least = std::numeric_limits<double>::infinity();
+            double most = -least;
+            for (int u = run.left; u <= run.right; ++u) {
+                const Weight& weight = weights_[index_of(d[u])];
+                sum_q4 += d[u];
+                area += weight.area_q32;
+                const double below = (across_[static_cast<std::size_t>(u)] + at_row) * weight.inverse_px;
+                least = std::min(least, below);
+                most = std::max(most, below);
+            }
+            Stats& stats = stats_[static_cast<std::size_t>(run.pixels)];
+            if (stats.pixels == 0) {
+                stats.kind = kinds[run.left];
+                stats.left = run.left;
+                stats.right = run.right;
+                stats.top = v;
+                stats.least = least;
+                stats.most = most;
+            }
+            stats.left = std::min(stats.left, run.left);
+            stats.right = std::max(stats.right, run.right);
+            stats.bottom = v;
+            stats.pixels += run.right - run.left + 1;
+            stats.sum_q4 += sum_q4;
+            stats.area_q32 += area;
+            stats.least = std::min(stats.least, least);
+            stats.most = std::max(stats.most, most);
+        });
     }
 }
 
@@ -144,7 +273,11 @@ void Components::choose(const ThingRules& rules) {
     for (std::int32_t i = 0; i < thing_count_; ++i) {
         Stats& stats = stats_[static_cast<std::size_t>(i)];
         stats.listed = kNone;
-        if (stats.area >= rules.min_area) chosen_[static_cast<std::size_t>(chosen_count_++)] = i;
+        // H/h < clearance in its lowest pixel
+        stats.low = !(rules.clearance > 0.0) || 1.0 - stats.most < rules.clearance;
+        stats.large = rules.unit_px * rules.unit_px * (static_cast<double>(stats.area_q32) / kAreaOne) >=
+                      rules.min_area;
+        if (stats.large) chosen_[static_cast<std::size_t>(chosen_count_++)] = i;
     }
     const auto comes_first = [&](std::int32_t a, std::int32_t b) {
         const Stats& one = stats_[static_cast<std::size_t>(a)];
@@ -162,10 +295,9 @@ void Components::choose(const ThingRules& rules) {
         stats_[static_cast<std::size_t>(chosen_[static_cast<std::size_t>(i)])].listed = i;
 }
 
-void Components::list(ConstDisparityMap map, const ThingRules& rules, Mask mask,
-                      FixedVector<Thing, kMaxObstacles>& things) {
+void Components::list(const ThingRules& rules, Mask mask, FixedVector<Thing, kMaxObstacles>& things) {
     std::fill_n(histograms_.begin(),
-                static_cast<std::size_t>(chosen_count_) * static_cast<std::size_t>(bins_), 0U);
+                static_cast<std::size_t>(chosen_count_) * static_cast<std::size_t>(bins_) * kWays, 0U);
     for (int i = 0; i < chosen_count_; ++i) {
         const Stats& stats = stats_[static_cast<std::size_t>(chosen_[static_cast<std::size_t>(i)])];
         Thing thing;
@@ -176,44 +308,37 @@ void Components::list(ConstDisparityMap map, const ThingRules& rules, Mask mask,
         thing.right = stats.right;
         thing.bottom = stats.bottom;
         thing.pixels = stats.pixels;
-        thing.ratio_high = -1e30;
-        thing.ratio_low = 1e30;
+        thing.ratio_high = 1.0 - stats.least;
+        thing.ratio_low = 1.0 - stats.most;
         things.push_back(thing);
     }
-    for (int v = 0; v < map.height(); ++v) {
-        const RowOfDisparity d = row_of(map, v, rules.range_edge_q4);
-        const std::int32_t* labels = labels_.row(v);
+    for (int v = 0; v < depths_.height; ++v) {
+        const std::int16_t* d = depths_.row(v);
         TerrainClass* kinds = mask.row(v);
-        const double at_row = rules.ground.dv * v + rules.ground.d0;
-        for (int u = 0; u < map.width(); ++u) {
-            if (labels[u] == kNone) continue;
-            const Run& run = runs_[static_cast<std::size_t>(labels[u])];
-            const std::int32_t number = runs_[static_cast<std::size_t>(run.parent)].pixels;
-            if (number == kNone) {
-                kinds[u] = TerrainClass::kUnknown;
-                continue;
-            }
-            const Stats& stats = stats_[static_cast<std::size_t>(number)];
-            if (stats.area < rules.min_area || !stats.low) kinds[u] = TerrainClass::kUnknown;
-            if (stats.listed == kNone) continue;
-            const std::size_t index = index_of(d[u]);
-            Thing& thing = things[static_cast<std::size_t>(stats.listed)];
-            const double ratio = 1.0 - (rules.ground.du * u + at_row) * inverse_px_[index];
-            thing.ratio_high = std::max(thing.ratio_high, ratio);
-            thing.ratio_low = std::min(thing.ratio_low, ratio);
-            const std::size_t bin = index / (kDisparityOne / kBinsPerPx);
-            ++histograms_[static_cast<std::size_t>(stats.listed) * static_cast<std::size_t>(bins_) + bin];
-        }
+        for_each_run(v, [&](const Run& run) {
+            if (run.pixels == kNone) return;
+            const Stats& stats = stats_[static_cast<std::size_t>(run.pixels)];
+            if (!stats.large || !stats.low)
+                std::fill(kinds + run.left, kinds + run.right + 1, TerrainClass::kUnknown);
+            if (stats.listed == kNone) return;
+            std::uint32_t* bins = &histograms_[static_cast<std::size_t>(stats.listed) *
+                                               static_cast<std::size_t>(bins_) * kWays];
+            const int right = run.right;
+            for (int u = run.left; u <= right; ++u)
+                ++bins[index_of(d[u]) / (kDisparityOne / kBinsPerPx) * kWays +
+                       static_cast<std::size_t>(u) % kWays];
+        });
     }
     const double first_px = static_cast<double>(first_q4_) / kDisparityOne;
     for (std::size_t i = 0; i < things.size(); ++i) {
-        const std::uint32_t* bins = &histograms_[i * static_cast<std::size_t>(bins_)];
+        const std::uint32_t* bins = &histograms_[i * static_cast<std::size_t>(bins_) * kWays];
         // Middle of the bin that holds the pixel of this rank, counted from the nearest.
         const auto disparity_at = [&](std::int64_t rank) {
             std::int64_t seen = 0;
             int bin = bins_ - 1;
             for (; bin > 0; --bin) {
-                seen += bins[bin];
+                for (std::size_t way = 0; way < kWays; ++way)
+                    seen += bins[static_cast<std::size_t>(bin) * kWays + way];
                 if (seen >= rank) break;
             }
             constexpr int kStepsPerBin = kDisparityOne / kBinsPerPx;
@@ -233,31 +358,22 @@ void Components::list(ConstDisparityMap map, const ThingRules& rules, Mask mask,
 
 void Components::find(ConstDisparityMap map, const ThingRules& rules, Mask mask,
                       FixedVector<Thing, kMaxObstacles>& things) {
-    assert(map.width() == labels_.width && map.height() == labels_.height);
+    assert(map.width() == depths_.width && map.height() == depths_.height);
     things.clear();
-    for (std::size_t i = 0; i < inverse_px_.size(); ++i) {
+    for (std::size_t i = 0; i < weights_.size(); ++i) {
         const double true_px = (first_q4_ + static_cast<double>(i)) * (1.0 / kDisparityOne) - rules.offset_px;
-        inverse_px_[i] = 1.0 / std::max(true_px, 1.0 / kDisparityOne);
+        const double inverse_px = 1.0 / std::max(true_px, 1.0 / kDisparityOne);
+        weights_[i] = {inverse_px, static_cast<std::uint64_t>(inverse_px * inverse_px * kAreaOne + 0.5)};
     }
-    const int runs = label(map, rules.range_edge_q4, mask);
-    // Roots with enough pixels get a number; every run then points at its root.
-    thing_count_ = 0;
-    for (std::int32_t i = 0; i < runs; ++i)
-        runs_[static_cast<std::size_t>(i)].parent = root_of(i);
-    const int least = std::max(1, rules.min_pixels);
-    for (std::int32_t i = 0; i < runs; ++i) {
-        Run& run = runs_[static_cast<std::size_t>(i)];
-        if (run.parent != i) continue;
-        const bool enough = run.pixels >= least && thing_count_ < static_cast<int>(stats_.size());
-        run.pixels = enough ? thing_count_++ : kNone;
-        if (enough) {
-            stats_[static_cast<std::size_t>(run.pixels)] = {};
-            stats_[static_cast<std::size_t>(run.pixels)].low = !(rules.clearance > 0.0);
-        }
+    first_run_[0] = 0;
+    for (int v = 0; v < map.height(); ++v) {
+        find_runs(map, rules.range_edge_q4, mask, v);
+        if (v > 0) join_rows(mask, v);
     }
-    measure(map, rules, mask);
+    number_things(std::max(1, rules.min_pixels));
+    measure(rules, mask);
     choose(rules);
-    list(map, rules, mask, things);
+    list(rules, mask, things);
 }
 
 }  // namespace groundline::terrain

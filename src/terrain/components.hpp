@@ -1,7 +1,7 @@
 // Connected things among the obstacle and drop pixels of a mask, in fixed memory and bounded time.
 #pragma once
 
-#include <array>
+#include <algorithm>
 #include <cstdint>
 #include <span>
 
@@ -36,7 +36,7 @@ struct Thing {
     double ratio_low = 0.0;
 };
 
-// Used by one thread. Time is near-linear in the pixels for any mask; memory is 12 bytes a pixel and some.
+// Used by one thread. Time is near-linear in the pixels for any mask; memory is 18 bytes a pixel and some.
 class Components {
   public:
     // min_pixels is the least that ThingRules will ever name.
@@ -52,36 +52,60 @@ class Components {
   private:
     struct Run {
         std::int32_t parent;
-        std::int32_t pixels;  // of the whole thing, at its root; after numbering, the thing's number or -1
+        std::int32_t pixels;  // of the whole thing, at its root; after numbering, the thing's number or kNone
+        std::int32_t left, right;
     };
     struct Stats {
-        double area;
+        std::uint64_t area_q32;
         std::int64_t sum_q4;
+        double least, most;  // 1 - H/h of its highest and its lowest pixel
         std::int32_t left, top, right, bottom, pixels, listed;
         TerrainClass kind;
-        bool low;  // reaches below the clearance
+        bool low;    // reaches below the clearance
+        bool large;  // has the area
+    };
+    // What a pixel of one measured disparity counts for. Areas are integers, so that no order of summing
+    // matters: with the nearest 1/16 px still 2^40, 2^20 of them fit.
+    struct Weight {
+        double inverse_px;       // 1 / true disparity
+        std::uint64_t area_q32;  // its square
     };
     static constexpr std::int32_t kNone = -1;
     static constexpr int kBinsPerPx = 4;
+    // Counters of one bin, of which neighbouring pixels take turns: adding to one twice in a row would wait.
+    static constexpr std::size_t kWays = 4;
+    static constexpr double kAreaOne = 4294967296.0;
 
+    Run& at(std::int32_t run) { return runs_[static_cast<std::size_t>(run)]; }
     std::int32_t root_of(std::int32_t run);
     void join(std::int32_t a, std::int32_t b);
-    int label(ConstDisparityMap map, int range_edge_q4, ConstMask mask);
-    void measure(ConstDisparityMap map, const ThingRules& rules, ConstMask mask);
+    void find_runs(ConstDisparityMap map, int range_edge_q4, ConstMask mask, int v);
+    bool touch(const Run& one, const Run& above, int v) const;
+    void join_rows(ConstMask mask, int v);
+    void number_things(int least);
+    void measure(const ThingRules& rules, Mask mask);
     void choose(const ThingRules& rules);
-    void list(ConstDisparityMap map, const ThingRules& rules, Mask mask,
-              FixedVector<Thing, kMaxObstacles>& things);
+    void list(const ThingRules& rules, Mask mask, FixedVector<Thing, kMaxObstacles>& things);
+    template <typename Use>
+    void for_each_run(int v, Use use) {
+        const auto row = static_cast<std::size_t>(v);
+        for (std::int32_t i = first_run_[row]; i < first_run_[row + 1]; ++i)
+            use(at(i));
+    }
     // Index into the tables by disparity.
-    std::size_t index_of(int measured_q4) const;
+    std::size_t index_of(int measured_q4) const { return static_cast<std::size_t>(measured_q4 - first_q4_); }
 
     int first_q4_ = 0;
-    ImageView<std::int32_t> labels_;
+    ImageView<std::int16_t>
+        depths_;  // measured, range-edge pixels in their place; only of blocks with things
     std::span<Run> runs_;
+    std::span<std::int32_t> first_run_;  // of each row
     std::span<Stats> stats_;
     int thing_count_ = 0;
     std::span<std::int32_t> chosen_;  // numbers of the things to list
     int chosen_count_ = 0;
-    std::span<double> inverse_px_;  // 1 / true disparity, by measured disparity in 1/16 px
+    std::span<double> across_;   // the ground's disparity along a row, by column
+    std::span<Weight> weights_;  // by measured disparity in 1/16 px
     std::span<std::uint32_t> histograms_;
     int bins_ = 0;
 };

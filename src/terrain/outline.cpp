@@ -1,43 +1,53 @@
 #include "terrain/outline.hpp"
 
 #include <algorithm>
+#include <bit>
+#include <cassert>
+#include <cstddef>
+#include <cstring>
+#include <utility>
 
 namespace groundline::terrain {
 namespace {
 
-using Bytes = ImageView<std::uint8_t>;
+constexpr int kBits = 64;
+constexpr std::uint64_t kEach = 0x0101010101010101U;  // one in each of eight bytes
 
-// out = in widened by reach px to both sides along the rows (1), or shrunk (0 widened).
-void spread_rows(Bytes in, Bytes out, int reach, std::uint8_t value) {
-    for (int v = 0; v < in.height; ++v) {
-        const std::uint8_t* from = in.row(v);
-        std::uint8_t* to = out.row(v);
-        int last = -1000000;
-        for (int u = 0; u < in.width; ++u) {
-            if (from[u] == value) last = u;
-            to[u] = u - last <= reach ? value : static_cast<std::uint8_t>(1 - value);
-        }
-        int next = 1000000;
-        for (int u = in.width - 1; u >= 0; --u) {
-            if (from[u] == value) next = u;
-            if (next - u <= reach) to[u] = value;
-        }
-    }
+static_assert(std::endian::native == std::endian::little);
+static_assert(static_cast<int>(TerrainClass::kUnknown) == 0 &&
+              static_cast<int>(TerrainClass::kTraversable) == 1 &&
+              static_cast<int>(TerrainClass::kObstacle) == 2 && static_cast<int>(TerrainClass::kDrop) == 3);
+
+template <typename T>
+std::uint64_t load_eight(const T* bytes) {
+    static_assert(sizeof(T) == 1);
+    std::uint64_t word;
+    std::memcpy(&word, bytes, sizeof word);
+    return word;
 }
 
-void spread_columns(Bytes in, Bytes out, int reach, std::uint8_t value) {
-    for (int v = 0; v < in.height; ++v) {
-        std::uint8_t* to = out.row(v);
-        std::copy_n(in.row(v), in.width, to);
-        for (int w = std::max(0, v - reach); w <= std::min(in.height - 1, v + reach); ++w) {
-            const std::uint8_t* from = in.row(w);
-            if (value == 1)
-                for (int u = 0; u < in.width; ++u)
-                    to[u] = static_cast<std::uint8_t>(to[u] | from[u]);
-            else
-                for (int u = 0; u < in.width; ++u)
-                    to[u] = static_cast<std::uint8_t>(to[u] & from[u]);
-        }
+// Eight bytes of 0 or 1 to eight bits, the first the lowest, and back. Byte k is moved to bit 56 + k; no two
+// partial products meet.
+std::uint64_t bits_of(std::uint64_t bytes) {
+    return bytes * 0x0102040810204080U >> 56U;
+}
+std::uint64_t bytes_of(std::uint64_t bits) {
+    return ((bits * kEach & 0x8040201008040201U) + 0x7f * kEach) >> 7U & kEach;
+}
+
+// 1 in each byte that is not 0; bytes are below 128.
+std::uint64_t not_zero(std::uint64_t bytes) {
+    return (bytes + 0x7f * kEach) >> 7U & kEach;
+}
+
+// Calls change(reach) with steps that together reach `reach_px`, each at most one more than all before it:
+// then a step needs nothing of what lies outside the picture.
+template <typename Step>
+void in_steps(int reach_px, Step step) {
+    for (int reached = 0; reached < reach_px;) {
+        const int by = std::min({reached + 1, reach_px - reached, kBits / 2});
+        step(by);
+        reached += by;
     }
 }
 
@@ -46,39 +56,137 @@ void spread_columns(Bytes in, Bytes out, int reach, std::uint8_t value) {
 void Outline::take(Arena& arena, int width, int height) {
     width_ = width;
     height_ = height;
-    marks_ = arena.image<std::uint8_t>(width, height);
-    across_ = arena.image<std::uint8_t>(width, height);
-    along_ = arena.image<std::uint8_t>(width, height);
+    words_ = (width + kBits - 1) / kBits;
+    last_word_ = ~Word{0} >> static_cast<unsigned>(words_ * kBits - width);
+    for (Plane* plane : {&obstacles_, &things_, &along_, &across_, &spare_})
+        *plane = arena.take<Word>(static_cast<std::size_t>(words_ + 2) * static_cast<std::size_t>(height));
+}
+
+// Fills obstacles_ and things_; returns whether there are any.
+bool Outline::collect(ConstMask mask) {
+    Word any = 0;
+    for (int v = 0; v < height_; ++v) {
+        const TerrainClass* kinds = mask.row(v);
+        Word* obstacles = row(obstacles_, v);
+        Word* things = row(things_, v);
+        for (int i = 0; i < words_; ++i) {
+            Word low = 0;
+            Word high = 0;
+            const int first = i * kBits;
+            for (int k = 0; k < kBits && first + k < width_; k += 8) {
+                const std::uint64_t eight = load_eight(kinds + first + k);
+                if ((eight & 2 * kEach) == 0) continue;
+                high |= bits_of(eight >> 1U & kEach) << k;
+                low |= bits_of(eight & kEach) << k;
+            }
+            if (i == words_ - 1) high &= last_word_;
+            obstacles[i] = high & ~low;
+            things[i] = high;
+            any |= high;
+        }
+    }
+    return any != 0;
+}
+
+// Sets what lies within reach_px of a set bit of its row.
+void Outline::widen_along(Plane plane, int reach_px) {
+    for (int v = 0; v < height_; ++v) {
+        Word* here = row(plane, v);
+        if (std::all_of(here, here + words_, [](Word word) { return word == 0; })) continue;
+        Word* before = row(spare_, 0);
+        in_steps(reach_px, [&](int by) {
+            std::copy_n(here, words_, before);
+            for (int i = 0; i < words_; ++i)
+                here[i] = before[i] | before[i] << by | before[i - 1] >> (kBits - by) | before[i] >> by |
+                          before[i + 1] << (kBits - by);
+        });
+        here[words_ - 1] &= last_word_;
+    }
+}
+
+// Sets what lies within reach_px of a set bit of its column.
+void Outline::widen_across(Plane& plane, int reach_px) {
+    in_steps(reach_px, [&](int by) {
+        for (int v = 0; v < height_; ++v) {
+            const Word* here = row(plane, v);
+            const Word* above = row(plane, std::max(v - by, 0));
+            const Word* below = row(plane, std::min(v + by, height_ - 1));
+            Word* out = row(spare_, v);
+            for (int i = 0; i < words_; ++i)
+                out[i] = here[i] | above[i] | below[i];
+        }
+        std::swap(plane, spare_);
+    });
+}
+
+void Outline::invert(Plane plane) const {
+    for (int v = 0; v < height_; ++v) {
+        Word* here = row(plane, v);
+        for (int i = 0; i < words_; ++i)
+            here[i] = ~here[i];
+        here[words_ - 1] &= last_word_;
+    }
+}
+
+// Widening, then widening what is left out: gaps up to twice the reach are closed.
+void Outline::fill_gaps(int gap_px, ConstImageView<Invalid> invalid, Mask mask) {
+    std::copy(obstacles_.begin(), obstacles_.end(), along_.begin());
+    widen_along(along_, gap_px);
+    invert(along_);
+    widen_along(along_, gap_px);
+    std::copy(obstacles_.begin(), obstacles_.end(), across_.begin());
+    widen_across(across_, gap_px);
+    invert(across_);
+    widen_across(across_, gap_px);
+    for (int v = 0; v < height_; ++v) {
+        const Word* obstacles = row(obstacles_, v);
+        const Word* open_along = row(along_, v);
+        const Word* open_across = row(across_, v);
+        Word* things = row(things_, v);
+        for (int i = 0; i < words_; ++i) {
+            Word gaps = ~(open_along[i] & open_across[i]) & ~obstacles[i];
+            if (i == words_ - 1) gaps &= last_word_;
+            for (; gaps != 0;) {
+                const int first = std::countr_zero(gaps) & ~7;
+                TerrainClass* kinds = mask.row(v) + i * kBits + first;
+                const std::uint64_t eight = load_eight(kinds);
+                const std::uint64_t unmatched = not_zero(load_eight(invalid.row(v) + i * kBits + first));
+                const std::uint64_t filled = bytes_of(gaps >> first & 0xffU) & unmatched & ~not_zero(eight);
+                const std::uint64_t result = eight | filled << 1U;
+                std::memcpy(kinds, &result, sizeof result);
+                things[i] |= bits_of(filled) << first;
+                gaps &= ~(Word{0xff} << first);
+            }
+        }
+    }
+}
+
+void Outline::blur(int blur_px, Mask mask) {
+    std::copy(things_.begin(), things_.end(), along_.begin());
+    widen_along(along_, blur_px);
+    widen_across(along_, blur_px);
+    for (int v = 0; v < height_; ++v) {
+        const Word* near = row(along_, v);
+        const Word* things = row(things_, v);
+        for (int i = 0; i < words_; ++i) {
+            for (Word beside = near[i] & ~things[i]; beside != 0;) {
+                const int first = std::countr_zero(beside) & ~7;
+                TerrainClass* kinds = mask.row(v) + i * kBits + first;
+                const std::uint64_t eight = load_eight(kinds);
+                // None of these is of class 2 or 3.
+                const std::uint64_t result = eight & ~bytes_of(beside >> first & 0xffU);
+                std::memcpy(kinds, &result, sizeof result);
+                beside &= ~(Word{0xff} << first);
+            }
+        }
+    }
 }
 
 void Outline::apply(int gap_px, int blur_px, ConstImageView<Invalid> invalid, Mask mask) {
-    for (int v = 0; v < height_; ++v)
-        for (int u = 0; u < width_; ++u)
-            marks_.at(u, v) = mask.at(u, v) == TerrainClass::kObstacle ? 1 : 0;
-    spread_rows(marks_, across_, gap_px, 1);
-    spread_rows(across_, along_, gap_px, 0);
-    for (int v = 0; v < height_; ++v)
-        for (int u = 0; u < width_; ++u)
-            if (along_.at(u, v) == 1 && invalid.at(u, v) != Invalid::kNone &&
-                mask.at(u, v) == TerrainClass::kUnknown)
-                mask.at(u, v) = TerrainClass::kObstacle;
-    spread_columns(marks_, across_, gap_px, 1);
-    spread_columns(across_, along_, gap_px, 0);
-    for (int v = 0; v < height_; ++v)
-        for (int u = 0; u < width_; ++u)
-            if (along_.at(u, v) == 1 && invalid.at(u, v) != Invalid::kNone &&
-                mask.at(u, v) == TerrainClass::kUnknown)
-                mask.at(u, v) = TerrainClass::kObstacle;
-    for (int v = 0; v < height_; ++v)
-        for (int u = 0; u < width_; ++u)
-            marks_.at(u, v) =
-                mask.at(u, v) == TerrainClass::kObstacle || mask.at(u, v) == TerrainClass::kDrop ? 1 : 0;
-    spread_rows(marks_, across_, blur_px, 1);
-    spread_columns(across_, along_, blur_px, 1);
-    for (int v = 0; v < height_; ++v)
-        for (int u = 0; u < width_; ++u)
-            if (along_.at(u, v) == 1 && mask.at(u, v) == TerrainClass::kTraversable)
-                mask.at(u, v) = TerrainClass::kUnknown;
+    assert(mask.same_size(width_, height_) && invalid.same_size(width_, height_));
+    if (!collect(mask)) return;
+    if (gap_px > 0) fill_gaps(gap_px, invalid, mask);
+    if (blur_px > 0) blur(blur_px, mask);
 }
 
 }  // namespace groundline::terrain

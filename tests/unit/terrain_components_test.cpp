@@ -2,14 +2,16 @@
 
 #include <gtest/gtest.h>
 
+#include <string>
 #include <tuple>
 
+#include "unit/terrain_plain_components.hpp"
 #include "unit/terrain_scene.hpp"
 
 namespace groundline::terrain {
 namespace {
 
-using test::Dice;
+using groundline::test::Dice;
 
 constexpr int kWidth = 97;
 constexpr int kHeight = 61;
@@ -31,57 +33,6 @@ struct Bench {
     }
     void find() { components.find(map, rules, mask, things); }
 };
-
-// What the rules say, by flooding from pixel to pixel.
-struct Flooded {
-    TerrainClass kind;
-    int left, top, right, bottom, pixels;
-    auto key() const { return std::tuple(static_cast<int>(kind), left, top, right, bottom, pixels); }
-    bool operator<(const Flooded& other) const { return key() < other.key(); }
-    bool operator==(const Flooded& other) const { return key() == other.key(); }
-};
-
-int disparity_of(const Bench& bench, int u, int v) {
-    return bench.map.invalid.at(u, v) == Invalid::kRangeEdge ? bench.rules.range_edge_q4
-                                                             : bench.map.disparity_q4.at(u, v);
-}
-
-std::vector<Flooded> flood(const Bench& bench, const std::vector<TerrainClass>& mask) {
-    std::vector<Flooded> found;
-    std::vector<bool> seen(mask.size(), false);
-    const auto at = [](int u, int v) { return static_cast<std::size_t>(v * kWidth + u); };
-    for (int v = 0; v < kHeight; ++v)
-        for (int u = 0; u < kWidth; ++u) {
-            const TerrainClass kind = mask[at(u, v)];
-            if (seen[at(u, v)] || (kind != TerrainClass::kObstacle && kind != TerrainClass::kDrop)) continue;
-            Flooded thing{kind, u, v, u, v, 0};
-            std::vector<std::pair<int, int>> open = {{u, v}};
-            seen[at(u, v)] = true;
-            while (!open.empty()) {
-                const auto [x, y] = open.back();
-                open.pop_back();
-                ++thing.pixels;
-                thing.left = std::min(thing.left, x);
-                thing.right = std::max(thing.right, x);
-                thing.bottom = std::max(thing.bottom, y);
-                for (int dy = -1; dy <= 1; ++dy)
-                    for (int dx = -1; dx <= 1; ++dx) {
-                        const int a = x + dx;
-                        const int b = y + dy;
-                        if (a < 0 || b < 0 || a >= kWidth || b >= kHeight || seen[at(a, b)]) continue;
-                        if (mask[at(a, b)] != kind) continue;
-                        const double one = disparity_of(bench, x, y) / 16.0;
-                        const double other = disparity_of(bench, a, b) / 16.0;
-                        if (std::fabs(one - other) > 1.0 + 0.02 * std::max(one, other) + 1e-12) continue;
-                        seen[at(a, b)] = true;
-                        open.push_back({a, b});
-                    }
-            }
-            found.push_back(thing);
-        }
-    std::sort(found.begin(), found.end());
-    return found;
-}
 
 std::vector<TerrainClass> copy(const Bench& bench) {
     std::vector<TerrainClass> pixels;
@@ -108,41 +59,156 @@ void scatter(Bench& bench, std::uint32_t seed, std::uint32_t share, bool smooth)
         }
 }
 
+// Finds the things twice and compares all of it, bit for bit. Returns how many there were.
+std::size_t expect_like_plain(Components& components, const test::PlainSearch& search,
+                              const DisparityMap& map, const ThingRules& rules, Mask mask,
+                              const std::string& what) {
+    Arena arena;
+    const Mask plain = arena.image<TerrainClass>(mask.width, mask.height);
+    copy_pixels<TerrainClass>(mask, plain);
+    const std::vector<Thing> truth = test::plain_things(search, map, rules, plain);
+    FixedVector<Thing, kMaxObstacles> found;
+    components.find(map, rules, mask, found);
+    EXPECT_TRUE(groundline::test::same_pixels<TerrainClass>(plain, mask)) << what;
+    EXPECT_EQ(found.size(), truth.size()) << what;
+    if (found.size() != truth.size()) return 0;
+    for (std::size_t i = 0; i < truth.size(); ++i) {
+        const auto all_of = [](const Thing& t) {
+            return std::tuple(t.kind, t.overhang, t.left, t.top, t.right, t.bottom, t.pixels, t.median_px,
+                              t.near_px, t.ratio_high, t.ratio_low);
+        };
+        EXPECT_TRUE(all_of(found[i]) == all_of(truth[i])) << what << ": thing " << i;
+    }
+    return truth.size();
+}
+
 TEST(Components, AreThoseOfAPlainFlood) {
-    Bench bench;
-    for (std::uint32_t seed = 1; seed <= 30; ++seed)
+    for (std::uint32_t seed = 1; seed <= 12; ++seed)
         for (const std::uint32_t share : {20U, 90U, 140U, 256U})
-            for (const bool smooth : {false, true}) {
-                scatter(bench, seed, share, smooth);
-                const std::vector<Flooded> truth = flood(bench, copy(bench));
-                // The list is short: only things of a size that leaves fewer than its room are compared.
-                int least = 1;
-                const auto count = [&](int pixels) {
-                    return std::count_if(truth.begin(), truth.end(),
-                                         [&](const Flooded& thing) { return thing.pixels >= pixels; });
-                };
-                while (count(least) > static_cast<int>(kMaxObstacles))
-                    ++least;
-                bench.rules.min_pixels = least;
-                bench.find();
-                std::vector<Flooded> found;
-                int kept_pixels = 0;
-                for (const Thing& thing : bench.things) {
-                    found.push_back(
-                        {thing.kind, thing.left, thing.top, thing.right, thing.bottom, thing.pixels});
-                    kept_pixels += thing.pixels;
+            for (const bool smooth : {false, true})
+                for (const bool picky : {false, true}) {
+                    Bench bench;
+                    scatter(bench, seed, share, smooth);
+                    if (picky) {
+                        bench.rules.min_pixels = 4;
+                        bench.rules.unit_px = 0.12;
+                        bench.rules.min_area = 2e-4;
+                        bench.rules.ground = {0.01, 0.5, -8.0 + seed % 5};
+                        bench.rules.offset_px = 1.5;
+                        bench.rules.clearance = 1.2;
+                    }
+                    expect_like_plain(bench.components, {0, kDisparities}, bench.map, bench.rules, bench.mask,
+                                      std::to_string(seed) + " " + std::to_string(share));
                 }
-                std::sort(found.begin(), found.end());
-                std::vector<Flooded> large;
-                for (const Flooded& thing : truth)
-                    if (thing.pixels >= least) large.push_back(thing);
-                ASSERT_EQ(found.size(), large.size()) << seed << " " << share;
-                EXPECT_TRUE(found == large) << seed << " " << share;
-                int pixels = 0;
-                for (const TerrainClass kind : copy(bench))
-                    pixels += kind == TerrainClass::kObstacle || kind == TerrainClass::kDrop ? 1 : 0;
-                EXPECT_EQ(pixels, kept_pixels);
+}
+
+// Runs that begin, end and go on where blocks of 64 pixels meet, and widths about that.
+TEST(Components, AreThoseOfAPlainFloodAtAnyWidth) {
+    Dice dice(3);
+    for (const int width : {1, 2, 7, 8, 63, 64, 65, 127, 128, 129, 200})
+        for (int round = 0; round < 12; ++round) {
+            const int height = 1 + static_cast<int>(dice.bits() % 9);
+            Arena arena;
+            Components components;
+            components.take(arena, width, height, -8, 40, 1);
+            const DisparityMap map = DisparityMap::make(arena, width, height);
+            const Mask mask = arena.image<TerrainClass>(width, height);
+            // What lies behind the rows must not matter.
+            for (int v = 0; v < height; ++v)
+                for (int u = width; u < width + 32; ++u) {
+                    mask.row(v)[u] = TerrainClass::kObstacle;
+                    map.disparity_q4.row(v)[u] = 300;
+                }
+            for (int v = 0; v < height; ++v) {
+                auto kind = TerrainClass::kTraversable;
+                int d = 300;
+                for (int u = 0; u < width; ++u) {
+                    if (dice.bits() % 24 == 0) kind = static_cast<TerrainClass>(dice.bits() % 4);
+                    if (dice.bits() % 24 == 0) d = static_cast<int>(dice.bits() % 640) - 128;
+                    mask.at(u, v) = kind;
+                    map.disparity_q4.at(u, v) =
+                        static_cast<std::int16_t>(d + static_cast<int>(dice.bits() % 20));
+                    map.invalid.at(u, v) = dice.bits() % 40 == 0 ? Invalid::kRangeEdge : Invalid::kNone;
+                }
             }
+            ThingRules rules;
+            rules.min_pixels = 1 + round % 3;
+            rules.min_area = 0.0;
+            rules.range_edge_q4 = 31 * 16;
+            rules.offset_px = -9.0;
+            expect_like_plain(components, {-8, 40}, map, rules, mask, std::to_string(width));
+        }
+}
+
+// Two pixels are connected up to exactly |delta d| = 1 + 0.02 d of the nearer one, beside and below each
+// other.
+TEST(Components, ConnectUpToExactlyTheStep) {
+    constexpr int kWide = 2040;
+    Arena arena;
+    Components components;
+    components.take(arena, 2, 2, -50, kWide + 50, 1);
+    const DisparityMap map = DisparityMap::make(arena, 2, 2);
+    const Mask mask = arena.image<TerrainClass>(2, 2);
+    for (int near_q4 = -16; near_q4 < 16 * kWide; near_q4 += near_q4 < 200 ? 1 : 97) {
+        int farthest = near_q4;  // by the rule in doubles, away from its limit
+        while ((near_q4 - (farthest - 1)) / 16.0 <= 1.0 + 0.02 * near_q4 / 16.0 + 1e-9)
+            --farthest;
+        for (const bool upright : {false, true})
+            for (const int step : {0, 1}) {
+                fill_pixels(mask, TerrainClass::kTraversable);
+                mask.at(0, 0) = TerrainClass::kObstacle;
+                map.disparity_q4.at(0, 0) = static_cast<std::int16_t>(near_q4);
+                mask.at(upright ? 0 : 1, upright ? 1 : 0) = TerrainClass::kObstacle;
+                map.disparity_q4.at(upright ? 0 : 1, upright ? 1 : 0) =
+                    static_cast<std::int16_t>(farthest - step);
+                ThingRules rules;
+                rules.min_pixels = 1;
+                rules.min_area = 0.0;
+                FixedVector<Thing, kMaxObstacles> things;
+                components.find(map, rules, mask, things);
+                ASSERT_EQ(things.size(), step == 0 ? 1U : 2U) << near_q4 << ' ' << upright;
+            }
+    }
+}
+
+// Boxes on the ground with noise, outliers and holes, classified by height alone.
+TEST(Components, OfRenderedWorldsAreThoseOfAPlainFlood) {
+    const RectifiedRig rig = groundline::test::rig_of(320, 240, 250.0, 0.24);
+    std::size_t most = 0;
+    for (std::uint32_t seed = 1; seed <= 6; ++seed) {
+        Arena arena;
+        Components components;
+        components.take(arena, rig.width, rig.height, 0, kDisparities, 12);
+        groundline::test::World world{rig, groundline::test::pose_deg(10.0, 3.0, 1.0), {}};
+        Dice dice(seed);
+        for (int i = 0; i < 8; ++i)
+            world.boxes.push_back({dice.between(1.2, 9.0), dice.between(-2.0, 2.0), dice.between(0.05, 1.0),
+                                   0.4, dice.between(1.0, 2.5), dice.between(0.0, 2.2) - 0.8});
+        world.ditch_from_m = 4.0;
+        world.ditch_to_m = 5.0;
+        world.ditch_depth_m = 1.0;
+        DisparityMap map = DisparityMap::make(arena, rig.width, rig.height);
+        groundline::test::render(world, 0, kDisparities, {0.25, 0.05, 0.1, seed}, map);
+        const Mask mask = arena.image<TerrainClass>(rig.width, rig.height);
+        ThingRules rules;
+        rules.ground = plane_of(world.pose, rig);
+        for (int v = 0; v < rig.height; ++v)
+            for (int u = 0; u < rig.width; ++u) {
+                const double d = map.disparity_q4.at(u, v) / 16.0;
+                const double height = 1.0 - rules.ground.at(u, v) / std::max(d, 0.5);
+                mask.at(u, v) = map.invalid.at(u, v) == Invalid::kRangeEdge ? TerrainClass::kObstacle
+                                : map.invalid.at(u, v) != Invalid::kNone    ? TerrainClass::kUnknown
+                                : height > 0.2                              ? TerrainClass::kObstacle
+                                : height < -0.2                             ? TerrainClass::kDrop
+                                                                            : TerrainClass::kTraversable;
+            }
+        rules.unit_px = rig.baseline_m;
+        rules.clearance = 2.0;
+        rules.range_edge_q4 = (kDisparities - 1) * 16;
+        most = std::max(
+            most, expect_like_plain(components, {0, kDisparities}, map, rules, mask, std::to_string(seed)));
+    }
+    EXPECT_GE(most, 8U);
 }
 
 TEST(Components, TooSmallThingsBecomeUnknown) {
