@@ -33,11 +33,17 @@ struct Obstacle {
     std::int32_t left = 0, top = 0, right = 0, bottom = 0;  // bounding box in px, right and bottom included
     std::int32_t pixels = 0;
     double disparity_px = 0.0;  // median, measured
-    double range_m = 0.0;       // along the optical axis, of the nearest tenth of its pixels
+    double range_m = 0.0;       // along the optical axis, of its nearest tenth or 100 pixels
     double range_sigma_m = 0.0;
-    double bearing_rad = 0.0;  // of its centre in the camera frame, positive to the left
-    double height_m = 0.0;     // of its highest pixel above the ground
-    double lowest_m = 0.0;     // of its lowest pixel above the ground
+    // In the camera frame, positive to the left: of its middle and of the outer edges of its outermost
+    // pixels.
+    double bearing_rad = 0.0;
+    double left_rad = 0.0;
+    double right_rad = 0.0;
+    double width_m =
+        0.0;  // between those edges, across its bearing, at range_m; of its depth nothing is seen
+    double height_m = 0.0;  // of its highest pixel above the ground
+    double lowest_m = 0.0;  // of its lowest pixel above the ground
 };
 inline constexpr std::size_t kMaxObstacles = 128;
 

@@ -346,7 +346,7 @@ void Components::list(const ThingRules& rules, Mask mask, FixedVector<Thing, kMa
         };
         const std::int64_t pixels = things[i].pixels;
         things[i].median_px = disparity_at((pixels + 1) / 2);
-        things[i].near_px = disparity_at((pixels + 9) / 10) - rules.offset_px;
+        things[i].near_px = disparity_at(std::min((pixels + 9) / 10, kNearPixels)) - rules.offset_px;
     }
     // A total order, so that sorting needs no stability (std::stable_sort allocates).
     std::sort(things.begin(), things.end(), [](const Thing& one, const Thing& other) {

@@ -21,17 +21,25 @@ struct ThingRules {
     double unit_px = 1.0;     // a pixel at true disparity d is unit_px / d wide: the baseline in metres
     double min_area = 0.003;  // sum over a thing's pixels of (unit_px / d)^2, at least
     double clearance = 0.0;   // H/h of the clearance; 0 where there is none
+    // The area is the size filter; this is a floor against chance: at long range few pixels already have the
+    // area, and outliers of the matching that touch each other would do.
     int min_pixels = 12;
     int range_edge_q4 = 0;  // what a range-edge pixel counts as, measured
 };
+
+// The smallest patch that the matching believes in. Of a wall of 60000 pixels as many lie 3 deviations
+// nearer.
+inline constexpr std::int64_t kNearPixels = 100;
 
 struct Thing {
     TerrainClass kind = TerrainClass::kObstacle;
     bool overhang = false;
     std::int32_t left = 0, top = 0, right = 0, bottom = 0;
     std::int32_t pixels = 0;
-    double median_px = 0.0;   // measured disparity
-    double near_px = 0.0;     // true disparity that the nearest tenth of its pixels reach
+    double median_px = 0.0;  // measured disparity
+    // True disparity that the nearest tenth of its pixels reach, at most kNearPixels of them: a post that the
+    // matching joins to the wall behind it still sets the range of both.
+    double near_px = 0.0;
     double ratio_high = 0.0;  // H/h of its highest and its lowest pixel
     double ratio_low = 0.0;
 };

@@ -254,6 +254,25 @@ TEST(Components, MedianAndNearTenthAreOfThePixels) {
     EXPECT_NEAR(bench.things[0].near_px, 28.0 - 3.0, 0.13);
 }
 
+// 120 pixels at 30 px before 2000 at 12 px, joined by a slope.
+TEST(Components, ASmallNearPartSetsTheRangeOfALargeThing) {
+    Bench bench;
+    fill_pixels(bench.mask, TerrainClass::kTraversable);
+    for (int v = 0; v < 40; ++v)
+        for (int u = 0; u < 86; ++u) {
+            const bool near = u >= 74 && v >= 30;
+            if (u >= 50 && !near && (v != 35 || u >= 74)) continue;
+            bench.mask.at(u, v) = TerrainClass::kObstacle;
+            bench.map.disparity_q4.at(u, v) = static_cast<std::int16_t>(near     ? 480
+                                                                        : u < 50 ? 192
+                                                                                 : 192 + 12 * (u - 50));
+        }
+    bench.find();
+    ASSERT_EQ(bench.things.size(), 1U);
+    EXPECT_NEAR(bench.things[0].median_px, 12.0, 0.13);
+    EXPECT_NEAR(bench.things[0].near_px, 30.0, 0.13);
+}
+
 TEST(Components, WhatHangsWhollyAboveTheClearanceIsListedAndUnknown) {
     Bench bench;
     fill_pixels(bench.mask, TerrainClass::kTraversable);
