@@ -42,8 +42,8 @@ class Classifier {
     // are obstacles, except where the ground itself is nearer than the search range; other invalid pixels
     // unknown. Then things, 8-connected with |delta d| <= 1 + 0.02 d: too small ones become unknown, those
     // wholly above the clearance become unknown and are listed as overhang, the rest is listed nearest first.
-    // A ground with found == false counts as kNone. `supported_rows` has one entry per row:
-    // contradicted rows are never class 1, others in kWeak only where supported.
+    // A ground with found == false counts as kNone. Heights are above `surface`, except above a held ground;
+    // its contradicted cells are never class 1, others in kWeak only where supported.
     // range_limit_m is the farthest r where class 1 is possible, 0 where it is not or without metres.
     void classify(ConstDisparityMap map, const Ground& ground, GroundUse use, const GroundSurface& surface,
                   Mask out, FixedVector<Obstacle, kMaxObstacles>& obstacles, double& range_limit_m,

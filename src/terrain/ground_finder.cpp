@@ -15,8 +15,7 @@ constexpr int kUnitsPerPixel = 16;
 constexpr double kNearPx = 1.0;
 constexpr double kInlierPx = 1.5;
 constexpr double kResidualPx = 3.0;
-constexpr int kTallyStep = 4;  // columns; every row is tallied, for its support
-constexpr double kRowOffShare = 0.5;
+constexpr int kTallyStep = 4;  // columns
 // Without calibration: focal length over width and baseline over height of real rigs.
 constexpr double kFocalMin = 0.5, kFocalMax = 1.5;
 constexpr double kSlopeMin = 0.015, kSlopeMax = 1.0;
@@ -57,7 +56,6 @@ GroundFinder::GroundFinder(const TerrainConfig& config, const RectifiedRig& rig,
     plane_fit_.take(arena, rig.width, rig.height);
     surface_.take(arena, rig.width, rig.height, min_disparity, disparities);
     tally_ = arena.take<RowTally>(static_cast<std::size_t>(rig.height));
-    supported_rows_ = arena.take<RowSupport>(static_cast<std::size_t>(rig.height));
     column_mass_ = arena.take<std::uint32_t>(static_cast<std::size_t>(disparities) * 4 + 1);
 }
 
@@ -228,7 +226,7 @@ void GroundFinder::tally(ConstDisparityMap map, const DisparityPlane& plane, Par
     constexpr int kRowsPerTask = 16;
     const int tasks = (map.height() + kRowsPerTask - 1) / kRowsPerTask;
     parallel.for_each(tasks, [&](int task, int) {
-        for (int v = task * kRowsPerTask; v < std::min(map.height(), (task + 1) * kRowsPerTask); ++v) {
+        for (int v = task * kRowsPerTask; v < std::min(map.height(), (task + 1) * kRowsPerTask); v += 2) {
             const std::int16_t* disparity = map.disparity_q4.row(v);
             const Invalid* invalid = map.invalid.row(v);
             const double at_row = plane.dv * v + plane.d0;
@@ -263,7 +261,9 @@ void GroundFinder::tally(ConstDisparityMap map, const DisparityPlane& plane, Par
                 row.weight += weight;
                 row.residual += weight * residual;
             }
+            // Each row looked at stands for the one below it too.
             tally_[static_cast<std::size_t>(v)] = row;
+            if (v + 1 < map.height()) tally_[static_cast<std::size_t>(v + 1)] = row;
         }
     });
 }
@@ -273,40 +273,20 @@ double GroundFinder::chance(double within_px) const {
     return std::min(1.0, 2.0 * within_px / disparities_);
 }
 
-// Judges each row by this frame's own pixels and returns the length of the longest run of supported ones,
-// short gaps bridged.
-int GroundFinder::support_rows(const DisparityPlane& plane) {
+// Length of the longest run of rows that this frame's own pixels support, short gaps bridged.
+int GroundFinder::supported_run(const DisparityPlane& plane) const {
     const int height = static_cast<int>(tally_.size());
     const double share = std::max(0.1, std::min(0.5, 3.0 * chance(kNearPx)));
     const int least = std::max(3, rig_.width / 320);
     const int gap = std::max(2, height / 40);
-    // Height off the plane, over the camera's, that a level row may have. If no row is farther off than half
-    // the tolerance, no two floors differ by more than the tolerance.
-    const double off = kRowOffShare * tolerance_share(plane);
     int longest = 0;
     int run_start = -1;
     int last_supported = -1;
-    int rows_off = 0;
-    bool contradicted = false;
     for (int v = height - 1; v >= 0; --v) {
         const RowTally& row = tally_[static_cast<std::size_t>(v)];
         const double ground_px = plane.at(centre_u_, v);
         const bool possible = ground_px <= last_disparity_ + 2.0;
         const bool supported = possible && row.near >= least && row.near >= share * row.valid;
-        // Residuals are of pixels within reach of the plane; their mean is the plane's own error there.
-        const bool is_off = row.weight >= least && row.weight >= share * row.valid &&
-                            std::fabs(row.residual) > off * row.weight * (ground_px - offset_px_);
-        rows_off = is_off ? rows_off + 1 : 0;
-        if (rows_off > gap && !contradicted) {
-            contradicted = true;
-            // Nearer rows, where roll mixes both floors, hide it in their mean.
-            const int mixed = std::min(height - 1, v + 2 * gap);
-            std::fill(supported_rows_.begin() + v, supported_rows_.begin() + mixed + 1,
-                      RowSupport::kContradicted);
-        }
-        supported_rows_[static_cast<std::size_t>(v)] = contradicted || is_off ? RowSupport::kContradicted
-                                                       : supported            ? RowSupport::kSupported
-                                                                              : RowSupport::kNone;
         if (!supported) continue;
         if (run_start < 0 || last_supported - v > gap + 1) run_start = v;
         last_supported = v;
@@ -415,13 +395,12 @@ void GroundFinder::find(ConstDisparityMap map, VDisparity& v_disparity, Parallel
     evidence.blocked_share = blocked * kTallyStep / (1.0 * map.width() * (height - lower_third));
     const double upright = upright_mass(v_disparity, first_below);
     if (!has_plane) {
-        std::fill(supported_rows_.begin(), supported_rows_.end(), RowSupport::kNone);
         evidence.wall = valid > 0 && upright > 0.5 * kTallyStep * valid;
         return;
     }
     evidence.inlier_share = valid > standing ? inliers / (valid - standing) : 0.0;
     evidence.line_run_share =
-        rows_below > 0 ? std::min(1.0, static_cast<double>(support_rows(plane)) / rows_below) : 0.0;
+        rows_below > 0 ? std::min(1.0, static_cast<double>(supported_run(plane)) / rows_below) : 0.0;
     evidence.second_peak_ratio = second_ratio;
     evidence.residual_rms_px = inliers > 0 ? std::sqrt(square / inliers) : 0.0;
     evidence.row_residual_px = rows_with_residual > 0 ? row_residuals / rows_with_residual : 0.0;
@@ -432,7 +411,7 @@ void GroundFinder::find(ConstDisparityMap map, VDisparity& v_disparity, Parallel
     evidence.line_found = inliers >= least_share * valid && evidence.line_run_share >= 0.1;
     ground.found = evidence.line_found && evidence.inside_gate && !evidence.wall;
     if (!ground.found) {
-        std::fill(supported_rows_.begin(), supported_rows_.end(), RowSupport::kNone);
+        surface_.flatten();
         return;
     }
     ground.plane = plane;

@@ -16,7 +16,6 @@
 #include "terrain/ground_surface.hpp"
 #include "terrain/hough.hpp"
 #include "terrain/plane_fit.hpp"
-#include "terrain/row_support.hpp"
 
 namespace groundline::terrain {
 
@@ -40,12 +39,7 @@ class GroundFinder {
     void find(ConstDisparityMap map, VDisparity& v_disparity, Parallel& parallel, const GroundPose* prior,
               GroundEvidence& evidence, Ground& ground);
 
-    // Per image row of the last frame. Supported: at least a tenth of the valid pixels and three times what
-    // chance would put there lie within 1 px of the ground found. Contradicted: the mean height of the pixels
-    // about the ground is off by more than half the tolerance, or was so in more than a fortieth of the rows
-    // on end nearer by or just beyond: then one plane lies between two floors and what is farther may be on
-    // the other. None everywhere where no ground was found.
-    std::span<const RowSupport> supported_rows() const { return supported_rows_; }
+    // The last frame's ground about that plane; flat and supported nowhere where none was found.
     const GroundSurface& surface() const { return surface_; }
 
   private:
@@ -68,7 +62,7 @@ class GroundFinder {
     void shape(ConstDisparityMap map, DisparityPlane& plane, Parallel& parallel);
     double tolerance_share(const DisparityPlane& plane) const;
     void tally(ConstDisparityMap map, const DisparityPlane& plane, Parallel& parallel);
-    int support_rows(const DisparityPlane& plane);
+    int supported_run(const DisparityPlane& plane) const;
     bool nearly_same(const DisparityPlane& a, const DisparityPlane& b) const;
     bool inside(const DisparityPlane& plane, const Gate& gate) const;
     bool leans(const DisparityPlane& plane) const;
@@ -88,7 +82,6 @@ class GroundFinder {
     PlaneFit plane_fit_;
     GroundSurface surface_;
     std::span<RowTally> tally_;
-    std::span<RowSupport> supported_rows_;
     std::span<std::uint32_t> column_mass_;
 };
 

@@ -47,7 +47,8 @@ void build_v_disparity(ConstDisparityMap map, VDisparity& out, Parallel& paralle
                     cells[bin + 1] = static_cast<std::uint16_t>(std::min(cells[bin + 1] + upper, 65535));
             } else {
                 cells[bin] = static_cast<std::uint16_t>(cells[bin] + lower);
-                if (upper > 0) cells[bin + 1] = static_cast<std::uint16_t>(cells[bin + 1] + upper);
+                // Behind the last bin, where nothing is added, rows are padded.
+                cells[bin + 1] = static_cast<std::uint16_t>(cells[bin + 1] + upper);
             }
         }
     });

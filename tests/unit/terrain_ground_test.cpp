@@ -22,7 +22,8 @@ constexpr int kDisparities = 96;
 struct Found {
     GroundEvidence evidence;
     Ground ground;
-    std::vector<RowSupport> supported;
+    bool flat = true;
+    double rise_at_10_px = 0.0;
 };
 
 class Bench {
@@ -41,7 +42,8 @@ class Bench {
     Found find(Parallel& parallel, const GroundPose* prior = nullptr) {
         Found found;
         finder_.find(map, v_disparity, parallel, prior, found.evidence, found.ground);
-        found.supported.assign(finder_.supported_rows().begin(), finder_.supported_rows().end());
+        found.flat = finder_.surface().flat();
+        found.rise_at_10_px = finder_.surface().rise(160);
         return found;
     }
     Found find(const World& world, const Noise& noise = {}) {
@@ -203,8 +205,7 @@ TEST(GroundV3, PoseDoesNotDependOnWhereBoxesStand) {
     EXPECT_GT(largest_share, 33);  // the trials do hide a good part of the ground
 }
 
-// A short gap does not break the run of the line, but rows without pixels of their own support nothing.
-TEST(GroundFinder, RowsWithoutPixelsOfTheirOwnAreNotSupported) {
+TEST(GroundFinder, AShortGapDoesNotBreakTheRunOfTheLine) {
     const RectifiedRig rig = rig_of();
     Bench bench(rig);
     const World world{rig, pose_deg(12.0, 0.0, 1.0), {}};
@@ -218,15 +219,12 @@ TEST(GroundFinder, RowsWithoutPixelsOfTheirOwnAreNotSupported) {
     const Found found = bench.find();
     ASSERT_TRUE(found.ground.found);
     EXPECT_EQ(found.evidence.line_run_share, whole);
-    for (std::size_t v = 295; v < 310; ++v)
-        EXPECT_EQ(found.supported[v], v >= 300 && v < 305 ? RowSupport::kNone : RowSupport::kSupported) << v;
 }
 
 void expect_no_ground(const Found& found) {
     EXPECT_FALSE(found.ground.found);
     EXPECT_FALSE(found.ground.metric);
-    for (const RowSupport row : found.supported)
-        EXPECT_EQ(row, RowSupport::kNone);
+    EXPECT_TRUE(found.flat);
     for (const double value : found.ground.covariance)
         EXPECT_EQ(value, 0.0);
 }
@@ -551,7 +549,7 @@ TEST(GroundFinder, PriorNarrowsTheGate) {
     EXPECT_FALSE(bench.find(&far).ground.found);
 }
 
-TEST(GroundFinder, SupportedRowsAreThoseWhereGroundIsSeen) {
+TEST(GroundFinder, TheRunOfTheLineEndsWhereNoGroundIsSeen) {
     const RectifiedRig rig = rig_of();
     Bench bench(rig);
     World world{rig, pose_deg(12.0, 0.0, 1.2), {}};
@@ -565,13 +563,6 @@ TEST(GroundFinder, SupportedRowsAreThoseWhereGroundIsSeen) {
         }
     const Found found = bench.find();
     ASSERT_TRUE(found.ground.found);
-    const double horizon = rig.cy_px - rig.focal_px * std::tan(world.pose.pitch_rad);
-    for (int v = 0; v < static_cast<int>(horizon); ++v)
-        EXPECT_EQ(found.supported[static_cast<std::size_t>(v)], RowSupport::kNone) << v;
-    for (int v = 300; v < 360; ++v)
-        EXPECT_EQ(found.supported[static_cast<std::size_t>(v)], RowSupport::kNone) << v;
-    for (int v = 365; v < rig.height; ++v)
-        EXPECT_EQ(found.supported[static_cast<std::size_t>(v)], RowSupport::kSupported) << v;
     EXPECT_LT(found.evidence.line_run_share, 0.7);
 }
 
@@ -589,7 +580,8 @@ TEST(GroundFinder, IsTheSameForAnyNumberOfLanes) {
         EXPECT_EQ(one.ground.plane.dv, other.ground.plane.dv);
         EXPECT_EQ(one.ground.plane.d0, other.ground.plane.d0);
         EXPECT_EQ(one.ground.covariance, other.ground.covariance);
-        EXPECT_EQ(one.supported, other.supported);
+        EXPECT_EQ(one.flat, other.flat);
+        EXPECT_EQ(one.rise_at_10_px, other.rise_at_10_px);
         EXPECT_EQ(one.evidence.residual_rms_px, other.evidence.residual_rms_px);
         EXPECT_EQ(one.evidence.row_residual_px, other.evidence.row_residual_px);
         EXPECT_EQ(one.evidence.second_peak_ratio, other.evidence.second_peak_ratio);

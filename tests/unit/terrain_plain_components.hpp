@@ -88,7 +88,8 @@ inline std::vector<Thing> plain_things(const PlainSearch& search, const Disparit
                 return search.min_disparity + (found.depths[rank - 1] / 4 + 0.375) / 4.0;
             };
             thing.median_px = middle((found.depths.size() + 1) / 2);
-            thing.near_px = middle(std::min<std::size_t>((found.depths.size() + 9) / 10, 100)) - rules.offset_px;
+            thing.near_px =
+                middle(std::min<std::size_t>((found.depths.size() + 9) / 10, 100)) - rules.offset_px;
             const bool listed = thing.pixels >= rules.min_pixels && found.area >= rules.min_area;
             if (!listed || thing.overhang)
                 for (const auto& [x, y] : found.pixels)
