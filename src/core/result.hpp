@@ -52,12 +52,15 @@ inline constexpr std::size_t kMaxObstacles = 128;
 struct Sector {
     double bearing_rad = 0.0;  // of its middle, positive to the left
     double width_rad = 0.0;
-    bool blocked = false;                        // an obstacle or a drop was seen
-    TerrainClass kind = TerrainClass::kUnknown;  // of the nearest thing
-    double nearest_m = 0.0;                      // to it, where blocked
+    // An obstacle or a drop was seen, or a gap inside the stopping distance: ground seen nearer, then none
+    // (unseen, hidden, or a lip behind which it falls away). Ground never seen is no gap.
+    bool blocked = false;
+    TerrainClass kind = TerrainClass::kUnknown;  // of the nearest such; a gap is unknown
+    double nearest_m = 0.0;                      // to it, where blocked; of a gap its near edge
     double nearest_sigma_m = 0.0;
-    // Ground seen from the near edge of the view on: it ends with the first stretch of which less than half
-    // was seen as traversable.
+    // Ground seen from the near edge of the view on, the robot's own parts left out: it ends before the first
+    // stretch of which less than three quarters were seen as traversable, and before a lip. 0 where nothing
+    // is seen at the near edge (the left border of the view, say).
     double free_range_m = 0.0;
     double coverage = 0.0;  // share of its pixels below the horizon that are not unknown
 };

@@ -125,7 +125,7 @@ void Processor::process(const StereoFrame& frame, FrameResult& result) {
 
     classifier_.classify(result.disparity, result.ground, decision.use, ground_finder_.surface(), result.mask,
                          result.obstacles, result.range_limit_m, parallel_);
-    sector_finder_.find(result.disparity, result.ground, result.mask, result.sectors);
+    sector_finder_.find(result.disparity, result.ground, result.mask, result.range_limit_m, result.sectors);
     if (elevation_grid_) elevation_grid_->find(result.disparity, result.ground, result.mask, result.grid);
     terrain::shares_of(result.mask, result.share);
     clock.end(Stage::kClassify);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <cstring>
+#include <limits>
 #include <string>
 
 #include "core/deterministic_math.hpp"
@@ -11,21 +13,35 @@
 namespace groundline::terrain {
 namespace {
 
-constexpr int kThingBinsPerPx = 4;   // of f b / range: a bin is a quarter of a pixel of disparity
-constexpr int kGroundBinsPerPx = 2;  // wider, so that a sector's bin holds enough pixels to judge half of
-constexpr int kEnough = 4;           // sampled pixels that make a thing
-constexpr int kStep = 2;             // rows; for the ground also columns
+constexpr double kNone = std::numeric_limits<double>::infinity();
+constexpr int kRows = 3;        // of the picture make a stretch
+constexpr int kThingStep = 2;   // rows and columns
+constexpr int kGroundStep = 4;  // columns
+constexpr int kFraction = 16;   // bits of a stretch's number while walking along a row
+// What is well seen, and what is a gap. Ground of little texture has holes, so not all of it need be seen;
+// half of a stretch over a thin ditch is ground before or behind it.
+constexpr double kWell = 0.75;
+constexpr double kHalf = 0.5;
+constexpr double kReached = 0.25;
+constexpr double kLeastGap = 0.1;    // m; what is shorter bears any wheel, and near by it is a few pixels
+constexpr double kLeastJump = 0.25;  // m
+constexpr double kJumpSigmas = 6.0;  // of disparity; disparities scatter, and gather near whole pixels
+// Rows that a matched window shows ground beyond a lip, after the classifier has taken off those next to a
+// drop.
+constexpr double kMarginRows = 3.0;
+constexpr double kMarginSigmas = 1.0;  // of disparity: how well one pixel's row of ground is known
 
 }  // namespace
 
-// One frame's geometry: along the ground, forward and left, of a pixel's ray per metre of depth, both linear
-// in (u, v).
+// One frame's geometry. With g the ground's true disparity at a pixel, the ground seen there lies at (x, y) /
+// g.
 struct SectorFinder::View {
     double scale = 0.0;  // f b
     double offset_px = 0.0;
-    DisparityPlane ground;  // of true disparity
-    double forward_u, forward_v, forward_0;
-    double left_u, left_v, left_0;
+    Linear ground;  // true disparity
+    Linear x, y;
+    BodyFrame body;
+    double rows = 0.0;  // f h: over a range, rows below the horizon
 };
 
 SectorFinder::SectorFinder(const TerrainConfig& config, const RectifiedRig& rig, int min_disparity,
@@ -34,38 +50,52 @@ SectorFinder::SectorFinder(const TerrainConfig& config, const RectifiedRig& rig,
       rig_(rig),
       last_disparity_(min_disparity + disparities - 1),
       count_(config.sectors),
-      thing_bins_((min_disparity + disparities) * kThingBinsPerPx + 1),
-      ground_bins_((min_disparity + disparities) * kGroundBinsPerPx + 1) {
+      stretches_(2 * rig.height / kRows + 1) {
     if (config.sectors < 1 || config.sectors > static_cast<int>(kMaxSectors))
         throw Refusal(ExitStatus::kConfig, "there can be 1 to " + std::to_string(kMaxSectors) +
                                                " sectors, not " + std::to_string(config.sectors));
     const auto sectors = static_cast<std::size_t>(count_);
-    edge_cos_ = arena.take<double>(sectors);
-    edge_sin_ = arena.take<double>(sectors);
-    things_ = arena.take<std::uint16_t>(2 * sectors * static_cast<std::size_t>(thing_bins_));
-    ground_seen_ = arena.take<std::uint32_t>(sectors * static_cast<std::size_t>(ground_bins_));
-    ground_likely_ = arena.take<std::uint32_t>(ground_seen_.size());
+    edges_ = arena.take<Edge>(sectors);
+    middles_ = arena.take<Edge>(sectors);
+    obstacles_ = arena.take<Nearest>(sectors);
+    drops_ = arena.take<Nearest>(sectors);
+    ground_ = arena.take<Stretch>(sectors * static_cast<std::size_t>(stretches_));
     known_ = arena.take<std::uint32_t>(sectors);
     below_ = arena.take<std::uint32_t>(sectors);
     if (!rig.calibrated) return;
     const double yaw = det::radians(config.mount_yaw_deg);
-    cos_yaw_ = det::cos(yaw);
-    sin_yaw_ = det::sin(yaw);
     first_bearing_rad_ = yaw + det::atan(rig.cx_px / rig.focal_px);
     const double last = yaw - det::atan((rig.width - 1 - rig.cx_px) / rig.focal_px);
     width_rad_ = (first_bearing_rad_ - last) / count_;
     for (std::size_t i = 0; i < sectors; ++i) {
-        const double bearing = first_bearing_rad_ - static_cast<double>(i + 1) * width_rad_;
-        edge_cos_[i] = det::cos(bearing);
-        edge_sin_[i] = det::sin(bearing);
+        const double right = first_bearing_rad_ - static_cast<double>(i + 1) * width_rad_;
+        const double middle = right + 0.5 * width_rad_;
+        edges_[i] = {{}, det::cos(right), det::sin(right)};
+        middles_[i] = {{}, det::cos(middle), det::sin(middle)};
     }
+}
+
+SectorFinder::View SectorFinder::view_of(const Ground& ground) const {
+    View view;
+    view.scale = rig_.focal_px * rig_.baseline_m;
+    view.offset_px = rig_.offset_px();
+    view.ground = {ground.plane.du, ground.plane.dv, ground.plane.d0 - view.offset_px};
+    view.body = body_frame(ground.pose, rig_, config_);
+    const auto along = [&](double origin_m, double u, double v, double c) -> Linear {
+        return {view.scale * u + origin_m * view.ground.u, view.scale * v + origin_m * view.ground.v,
+                view.scale * c + origin_m * view.ground.c};
+    };
+    view.x = along(view.body.x_m, view.body.x_u, view.body.x_v, view.body.x_0);
+    view.y = along(view.body.y_m, view.body.y_u, view.body.y_v, view.body.y_0);
+    view.rows = rig_.focal_px * ground.pose.height_m;
+    return view;
 }
 
 // Sectors run from left to right; a point is beyond a sector when it lies right of its right edge.
 int SectorFinder::sector_of(double x, double y, int guess) const {
     const auto beyond = [&](int sector) {
-        const auto i = static_cast<std::size_t>(sector);
-        return edge_cos_[i] * y - edge_sin_[i] * x < 0.0;
+        const Edge& edge = edges_[static_cast<std::size_t>(sector)];
+        return edge.cosine * y - edge.sine * x < 0.0;
     };
     while (guess > 0 && !beyond(guess - 1))
         --guess;
@@ -74,135 +104,214 @@ int SectorFinder::sector_of(double x, double y, int guess) const {
     return guess;
 }
 
-void SectorFinder::count_things(ConstDisparityMap map, const View& view, ConstMask mask) {
-    std::fill(things_.begin(), things_.end(), std::uint16_t{0});
-    for (int v = 0; v < mask.height; v += kStep) {
+void SectorFinder::collect_things(ConstDisparityMap map, const View& view, ConstMask mask) {
+    Nearest none;
+    none.fill(kNone);
+    std::fill(obstacles_.begin(), obstacles_.end(), none);
+    std::fill(drops_.begin(), drops_.end(), none);
+    // Obstacle and drop are the classes with the second bit set.
+    constexpr std::uint64_t kThing = 0x0202020202020202U;
+    const BodyFrame& body = view.body;
+    for (int v = 0; v < mask.height; v += kThingStep) {
         const TerrainClass* kinds = mask.row(v);
         const std::int16_t* disparity = map.disparity_q4.row(v);
         const Invalid* invalid = map.invalid.row(v);
         int sector = 0;
-        for (int u = 0; u < mask.width; ++u) {
-            if (kinds[u] != TerrainClass::kObstacle && kinds[u] != TerrainClass::kDrop) continue;
-            if (invalid[u] != Invalid::kNone && invalid[u] != Invalid::kRangeEdge) continue;
-            const double measured_px =
-                invalid[u] == Invalid::kRangeEdge ? last_disparity_ : disparity[u] * (1.0 / kDisparityOne);
-            const double depth = view.scale / std::max(measured_px - view.offset_px, 1.0 / kDisparityOne);
-            const double forward = depth * (view.forward_u * u + view.forward_v * v + view.forward_0);
-            const double left = depth * (view.left_u * u + view.left_v * v + view.left_0);
-            const double x = config_.mount_x_m + cos_yaw_ * forward - sin_yaw_ * left;
-            const double y = config_.mount_y_m + sin_yaw_ * forward + cos_yaw_ * left;
-            sector = sector_of(x, y, sector);
-            const double inverse = kThingBinsPerPx * view.scale / std::sqrt(x * x + y * y);
-            const int bin = inverse < thing_bins_ ? static_cast<int>(inverse) : thing_bins_ - 1;
-            const int kind = kinds[u] == TerrainClass::kObstacle ? 0 : 1;
-            std::uint16_t& cell =
-                things_[static_cast<std::size_t>((kind * count_ + sector) * thing_bins_ + bin)];
-            if (cell < 65535) ++cell;
+        for (int from = 0; from < mask.width; from += 8) {
+            const int to = std::min(from + 8, mask.width);
+            std::uint64_t eight = kThing;
+            if (to == from + 8) std::memcpy(&eight, kinds + from, 8);
+            if ((eight & kThing) == 0) continue;
+            for (int u = from; u < to; u += kThingStep) {
+                if (kinds[u] != TerrainClass::kObstacle && kinds[u] != TerrainClass::kDrop) continue;
+                if (invalid[u] != Invalid::kNone && invalid[u] != Invalid::kRangeEdge) continue;
+                const double measured_px = invalid[u] == Invalid::kRangeEdge
+                                               ? last_disparity_
+                                               : disparity[u] * (1.0 / kDisparityOne);
+                const double depth = view.scale / std::max(measured_px - view.offset_px, 1.0 / kDisparityOne);
+                const double x = body.x_m + depth * body.along_x(u, v);
+                const double y = body.y_m + depth * body.along_y(u, v);
+                sector = sector_of(x, y, sector);
+                double square = x * x + y * y;
+                Nearest& nearest =
+                    (kinds[u] == TerrainClass::kObstacle ? obstacles_
+                                                         : drops_)[static_cast<std::size_t>(sector)];
+                if (square >= nearest.back()) continue;
+                for (double& each : nearest)
+                    if (square < each) std::swap(square, each);
+            }
         }
     }
 }
 
-void SectorFinder::count_ground(const View& view, ConstMask mask) {
-    std::fill(ground_seen_.begin(), ground_seen_.end(), 0U);
-    std::fill(ground_likely_.begin(), ground_likely_.end(), 0U);
+// In the picture a bearing is a straight line through the body's foot point, so a row crosses the edges of
+// the sectors from left to right, and between two of them a stretch's number is nearly linear in the column:
+// f h / range, range measured along the sector's middle (at most 1 - cos of half its width too short).
+void SectorFinder::count_ground(ConstDisparityMap map, const View& view, ConstMask mask) {
+    std::fill(ground_.begin(), ground_.end(), Stretch{});
     std::fill(known_.begin(), known_.end(), 0U);
     std::fill(below_.begin(), below_.end(), 0U);
-    for (int v = 0; v < mask.height; v += kStep) {
+    const auto mix = [](const Linear& x, double a, const Linear& y, double b) -> Linear {
+        return {a * x.u + b * y.u, a * x.v + b * y.v, a * x.c + b * y.c};
+    };
+    for (Edge& edge : edges_)
+        edge.beyond = mix(view.x, -edge.sine, view.y, edge.cosine);
+    for (Edge& middle : middles_)
+        middle.beyond = mix(view.x, middle.cosine, view.y, middle.sine);
+    const double per_row = view.rows / kRows;
+    const double most = stretches_ - 1;
+    for (int v = 0; v < mask.height; ++v) {
         const TerrainClass* kinds = mask.row(v);
-        int sector = 0;
-        for (int u = 0; u < mask.width; u += kStep) {
-            const double ground_px = view.ground.at(u, v);
-            if (ground_px < 1.0) continue;
-            const double depth = view.scale / ground_px;
-            const double forward = depth * (view.forward_u * u + view.forward_v * v + view.forward_0);
-            const double left = depth * (view.left_u * u + view.left_v * v + view.left_0);
-            const double x = config_.mount_x_m + cos_yaw_ * forward - sin_yaw_ * left;
-            const double y = config_.mount_y_m + sin_yaw_ * forward + cos_yaw_ * left;
-            sector = sector_of(x, y, sector);
-            ++below_[static_cast<std::size_t>(sector)];
-            known_[static_cast<std::size_t>(sector)] += kinds[u] != TerrainClass::kUnknown ? 1U : 0U;
+        const Invalid* invalid = map.invalid.row(v);
+        const std::int16_t* disparity = map.disparity_q4.row(v);
+        int begin = 0;
+        for (int i = 0; i < count_; ++i) {
+            const auto at = static_cast<std::size_t>(i);
+            const int first = begin;
+            int end = mask.width;
+            if (const Linear& line = edges_[at].beyond; i + 1 < count_) {
+                const double crossing = line.u < 0.0 ? (line.v * v + line.c) / -line.u : mask.width;
+                end = crossing < mask.width ? std::max(begin, static_cast<int>(crossing) + 1) : mask.width;
+            }
+            begin = end;
+            const int start = (first + kGroundStep - 1) / kGroundStep * kGroundStep;
+            if (start >= end) continue;
+            const double left_px = view.ground.at(start, v);
+            const double right_px = view.ground.at(end - 1, v);
+            const double left_range = middles_[at].beyond.at(start, v);
+            const double right_range = middles_[at].beyond.at(end - 1, v);
+            if (left_px < 1.0 || right_px < 1.0 || left_range <= 0.0 || right_range <= 0.0) continue;
+            const double left = std::min(per_row * left_px / left_range, most);
+            const double right = std::min(per_row * right_px / right_range, most);
+            constexpr double kOne = 1 << kFraction;
+            auto number = static_cast<std::int32_t>(left * kOne);
+            const auto step =
+                end - 1 > start
+                    ? static_cast<std::int32_t>((right - left) * (kOne * kGroundStep) / (end - 1 - start))
+                    : 0;
+            // Over a measured disparity, the same by what was measured.
+            const double per_px = per_row / (left_range + right_range) * (2.0 / kDisparityOne);
+            const double offset_q4 = view.offset_px * kDisparityOne;
+            std::uint32_t below = 0;
+            std::uint32_t known = 0;
             // Ground nearer than the search range cannot be seen and is no gap: what is seen begins there.
-            if (ground_px > last_disparity_) continue;
-            const double inverse = kGroundBinsPerPx * view.scale / std::sqrt(x * x + y * y);
-            const int bin = inverse < ground_bins_ ? static_cast<int>(inverse) : ground_bins_ - 1;
-            const auto at = static_cast<std::size_t>(sector * ground_bins_ + bin);
-            ++ground_likely_[at];
-            ground_seen_[at] += kinds[u] == TerrainClass::kTraversable ? 1U : 0U;
+            const bool searched = left_px + right_px <= 2.0 * (last_disparity_ - 2);
+            Stretch* const stretch = &ground_[at * static_cast<std::size_t>(stretches_)];
+            for (int u = start; u < end; u += kGroundStep, number += step) {
+                const bool outside = invalid[u] == Invalid::kBody || invalid[u] == Invalid::kNoImage;
+                const auto counts = static_cast<std::uint16_t>(!outside);
+                below += counts;
+                known += kinds[u] != TerrainClass::kUnknown ? 1U : 0U;
+                if (!searched) continue;
+                Stretch& cell = stretch[number >> kFraction];
+                cell.likely = static_cast<std::uint16_t>(cell.likely + counts);
+                if (kinds[u] != TerrainClass::kTraversable) continue;
+                ++cell.seen;
+                const double measured = (disparity[u] - offset_q4) * per_px;
+                ++stretch[measured < most ? static_cast<int>(measured) : stretches_ - 1].reached;
+            }
+            below_[at] += below;
+            known_[at] += known;
         }
     }
 }
 
-// Range of the 4th-nearest sampled pixel (the last where there are fewer), 0 where there is none.
-double SectorFinder::nearest(std::span<const std::uint16_t> bins, double scale, double& width_m) const {
-    int seen = 0;
-    int last = -1;
-    for (int bin = thing_bins_ - 1; bin >= 0 && seen < kEnough; --bin) {
-        if (bins[static_cast<std::size_t>(bin)] == 0) continue;
-        seen += bins[static_cast<std::size_t>(bin)];
-        last = bin;
+// The first stretch, from the near edge of the view or from `from` on, that begins a gap; 0 where none does.
+// A gap is at least kLeastGap long: there, less than `least_seen` of the samples are class 1, or nearly no
+// disparity of class 1 lies there (the ground jumps away behind a lip, though by less than the tolerance).
+int SectorFinder::first_gap(std::span<const Stretch> stretches, double rows, int from, double least_seen,
+                            double least_jump) const {
+    for (int number = from; number > 0; --number) {
+        const Stretch& first = stretches[static_cast<std::size_t>(number)];
+        if (first.likely == 0) continue;
+        const bool unseen = first.seen < least_seen * first.likely;
+        const bool unreached = first.reached < kReached * first.likely;
+        if (!unseen && !unreached) continue;
+        const double begin = rows / (kRows * (number + 1));
+        int likely = 0;
+        int seen = 0;
+        int reached = 0;
+        double length = 0.0;
+        for (int n = number; n > 0 && (length < kLeastJump || kRows * (number - n) < least_jump); --n) {
+            const Stretch& stretch = stretches[static_cast<std::size_t>(n)];
+            likely += stretch.likely;
+            seen += stretch.seen;
+            reached += stretch.reached;
+            const bool enough = length < kLeastGap;
+            length = rows / (kRows * n) - begin;
+            if (unseen && enough && length >= kLeastGap && seen < least_seen * likely) return number;
+        }
+        if (unseen && length < kLeastGap && seen < least_seen * likely) return number;
+        if (unreached && reached < kReached * likely) return number;
     }
-    if (last < 0) return 0.0;
-    const double range = kThingBinsPerPx * scale / (last + 0.5);
-    width_m = range / (last + 0.5);
-    return range;
+    return 0;
 }
 
-void SectorFinder::find(ConstDisparityMap map, const Ground& ground, ConstMask mask,
+void SectorFinder::judge_ground(const View& view, int index, double range_limit_m, Sector& sector) const {
+    const std::span<const Stretch> stretches =
+        ground_.subspan(static_cast<std::size_t>(index * stretches_), static_cast<std::size_t>(stretches_));
+    const double rows_per_px = view.rows / view.scale;  // 1 / dv, nearly
+    const double jump = kJumpSigmas * config_.sigma_disparity_px * rows_per_px;
+    int first = stretches_ - 1;
+    while (first > 0 && stretches[static_cast<std::size_t>(first)].likely == 0)
+        --first;
+    int end = first_gap(stretches, view.rows, first, kWell, jump);
+    if (first == 0 || end == first) return;
+    const auto range = [&](double rows) { return view.rows / rows; };
+    if (end == 0) {
+        while (stretches[static_cast<std::size_t>(end + 1)].likely == 0)
+            ++end;
+        sector.free_range_m = range(kRows * (end + 1));
+        return;
+    }
+    // Beyond the certified range nothing is seen as free, which is no lip.
+    const Edge& middle = middles_[static_cast<std::size_t>(index)];
+    const double certain_px = view.scale / std::max(range_limit_m, 1e-3) + 2.0 * config_.sigma_disparity_px;
+    const double far = range(kRows * end);
+    const double depth = view.body.depth_m(far * middle.cosine, far * middle.sine);
+    const double margin = depth * certain_px < view.scale
+                              ? kMarginRows + kMarginSigmas * config_.sigma_disparity_px * rows_per_px
+                              : 0.0;
+    sector.free_range_m = range(kRows * (end + 1) + margin);
+
+    end = first_gap(stretches, view.rows, end, kHalf, jump);
+    const double gap = range(kRows * (end + 1));
+    if (end == 0 || gap >= config_.stopping_distance_m) return;
+    // The outline of a thing is unknown, and so is the ground that it hides: that is the thing's gap.
+    const double shadow = range(std::max(kRows * (end + 1) - (config_.blur_px + 2.0 * kRows), 1e-3));
+    if (sector.blocked && sector.nearest_m <= shadow) return;
+    sector.blocked = true;
+    sector.kind = TerrainClass::kUnknown;
+    sector.nearest_m = gap;
+    sector.nearest_sigma_m = gap * gap * config_.sigma_disparity_px / view.scale;
+}
+
+void SectorFinder::find(ConstDisparityMap map, const Ground& ground, ConstMask mask, double range_limit_m,
                         FixedVector<Sector, kMaxSectors>& sectors) {
     sectors.clear();
     if (!rig_.calibrated || !ground.found || !ground.metric) return;
     assert(mask.same_size(rig_.width, rig_.height));
-
-    View view;
-    view.scale = rig_.focal_px * rig_.baseline_m;
-    view.offset_px = rig_.offset_px();
-    view.ground = ground.plane;
-    view.ground.d0 -= view.offset_px;
-    // The ground's normal n, forward = z - (z n) n made unit, left = forward x n.
-    const double cos_pitch = det::cos(ground.pose.pitch_rad);
-    const double nx = det::sin(ground.pose.roll_rad) * cos_pitch;
-    const double ny = det::cos(ground.pose.roll_rad) * cos_pitch;
-    const double nz = det::sin(ground.pose.pitch_rad);
-    const double fx = -nz * nx / cos_pitch;
-    const double fy = -nz * ny / cos_pitch;
-    const double fz = (1.0 - nz * nz) / cos_pitch;
-    const double lx = fy * nz - fz * ny;
-    const double ly = fz * nx - fx * nz;
-    const double lz = fx * ny - fy * nx;
-    const double per_px = 1.0 / rig_.focal_px;
-    view.forward_u = fx * per_px;
-    view.forward_v = fy * per_px;
-    view.forward_0 = fz - (fx * rig_.cx_px + fy * rig_.cy_px) * per_px;
-    view.left_u = lx * per_px;
-    view.left_v = ly * per_px;
-    view.left_0 = lz - (lx * rig_.cx_px + ly * rig_.cy_px) * per_px;
-
-    count_things(map, view, mask);
-    count_ground(view, mask);
+    const View view = view_of(ground);
+    collect_things(map, view, mask);
+    count_ground(map, view, mask);
     for (int i = 0; i < count_; ++i) {
         const auto at = static_cast<std::size_t>(i);
         Sector sector;
         sector.bearing_rad = first_bearing_rad_ - (i + 0.5) * width_rad_;
         sector.width_rad = width_rad_;
-        for (const int kind : {0, 1}) {
-            const auto first = static_cast<std::size_t>((kind * count_ + i) * thing_bins_);
-            double width_m = 0.0;
-            const double range =
-                nearest(things_.subspan(first, static_cast<std::size_t>(thing_bins_)), view.scale, width_m);
-            if (range <= 0.0 || (sector.blocked && range >= sector.nearest_m)) continue;
+        for (const TerrainClass kind : {TerrainClass::kObstacle, TerrainClass::kDrop}) {
+            const Nearest& nearest = kind == TerrainClass::kObstacle ? obstacles_[at] : drops_[at];
+            // The last where there are fewer.
+            const auto last = std::find(nearest.begin(), nearest.end(), kNone);
+            if (last == nearest.begin()) continue;
+            const double range = std::sqrt(*(last - 1));
+            if (sector.blocked && range >= sector.nearest_m) continue;
             sector.blocked = true;
-            sector.kind = kind == 0 ? TerrainClass::kObstacle : TerrainClass::kDrop;
+            sector.kind = kind;
             sector.nearest_m = range;
-            const double noise = range * range * config_.sigma_disparity_px / view.scale;
-            sector.nearest_sigma_m = std::sqrt(noise * noise + width_m * width_m / 12.0);
+            sector.nearest_sigma_m = range * range * config_.sigma_disparity_px / view.scale;
         }
-        const std::size_t first = at * static_cast<std::size_t>(ground_bins_);
-        for (int bin = ground_bins_ - 1; bin > 0; --bin) {
-            const std::uint32_t likely = ground_likely_[first + static_cast<std::size_t>(bin)];
-            if (likely == 0) continue;
-            if (2 * ground_seen_[first + static_cast<std::size_t>(bin)] < likely) break;
-            sector.free_range_m = kGroundBinsPerPx * view.scale / (bin + 0.5);
-        }
+        judge_ground(view, i, range_limit_m, sector);
         if (sector.blocked) sector.free_range_m = std::min(sector.free_range_m, sector.nearest_m);
         sector.coverage = below_[at] > 0 ? static_cast<double>(known_[at]) / below_[at] : 0.0;
         sectors.push_back(sector);

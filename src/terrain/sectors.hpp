@@ -1,6 +1,7 @@
 // What is known per bearing about the robot: nearest thing, and how far ground was really seen.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 
@@ -11,6 +12,7 @@
 #include "core/rectified_rig.hpp"
 #include "core/result.hpp"
 #include "core/terrain_class.hpp"
+#include "terrain/body_frame.hpp"
 #include "terrain/config.hpp"
 
 namespace groundline::terrain {
@@ -24,37 +26,69 @@ class SectorFinder {
                  Arena& arena);
 
     // Fills `sectors` from a classified frame; leaves it empty where the ground was not found or has no
-    // metres, or the rig is not calibrated. Ranges are along the ground from the body's origin. nearest_m is
-    // to the 4th-nearest sampled pixel of class 2 or 3, so that no single pixel decides; range-edge pixels
-    // count at the nearest range searched. free_range_m ends at the first stretch of ground of which less
-    // than half was seen as class 1, and never beyond nearest_m: it is 0 where the nearest stretch is not.
-    void find(ConstDisparityMap map, const Ground& ground, ConstMask mask,
+    // metres, or the rig is not calibrated. `range_limit_m` is the classifier's. Ranges are along the ground
+    // from the body's origin.
+    //
+    // Things: nearest_m is to the 4th-nearest sampled pixel of class 2 or 3 that has a disparity, so that no
+    // single pixel decides; range-edge pixels count at the nearest range searched. Every second pixel of
+    // every second row is sampled.
+    //
+    // Ground: the rows that show it are taken in stretches of 3, from the near edge of the view on. That edge
+    // is where the picture begins that is not the robot itself; ground nearer than the search range is left
+    // out too. free_range_m ends at the near edge of the first 0.1 m or more of which less than 3/4 was seen
+    // as class 1, or where nearly no disparity of class 1 lies although rows of it do (the ground falls away
+    // behind a lip), less 3 rows and one sigma of disparity: windows that match across a lip see the ground
+    // beyond it. Where the certified range ends what is seen, nothing is taken off. It is never beyond
+    // nearest_m, and 0 where nothing is seen at the near edge.
+    //
+    // Gap: ground seen nearer, and then 0.1 m or more less than half seen, or a lip. Where it begins within
+    // the stopping distance and no thing stands right behind it, the sector is blocked by it: kind unknown,
+    // nearest_m its near edge. Robot's own parts are no gap.
+    void find(ConstDisparityMap map, const Ground& ground, ConstMask mask, double range_limit_m,
               FixedVector<Sector, kMaxSectors>& sectors);
 
   private:
+    static constexpr int kEnough = 4;  // sampled pixels that make a thing
+    // The nearest of the pixels sampled, squared ranges in rising order.
+    using Nearest = std::array<double, kEnough>;
+    struct Stretch {
+        std::uint16_t likely;   // samples where the ground would be seen
+        std::uint16_t seen;     // of those, class 1
+        std::uint16_t reached;  // samples of class 1 whose disparity lies here, wherever their row does
+    };
+    // Linear over the picture.
+    struct Linear {
+        double u, v, c;
+        double at(double column, double row) const { return u * column + v * row + c; }
+    };
     struct View;
+    struct Edge {
+        Linear beyond;  // negative to the right of it
+        double cosine, sine;
+    };
+
+    View view_of(const Ground& ground) const;
     int sector_of(double x, double y, int guess) const;
-    void count_things(ConstDisparityMap map, const View& view, ConstMask mask);
-    void count_ground(const View& view, ConstMask mask);
-    double nearest(std::span<const std::uint16_t> bins, double scale, double& width_m) const;
+    void collect_things(ConstDisparityMap map, const View& view, ConstMask mask);
+    void count_ground(ConstDisparityMap map, const View& view, ConstMask mask);
+    int first_gap(std::span<const Stretch> stretches, double rows, int from, double least_seen,
+                  double least_jump) const;
+    void judge_ground(const View& view, int index, double range_limit_m, Sector& sector) const;
 
     TerrainConfig config_;
     RectifiedRig rig_;
     int last_disparity_;
     int count_;
-    int thing_bins_;
-    int ground_bins_;
+    int stretches_;
     double first_bearing_rad_ = 0.0;  // left edge of the leftmost sector
     double width_rad_ = 0.0;
-    double cos_yaw_ = 1.0;
-    double sin_yaw_ = 0.0;
-    std::span<double> edge_cos_;  // direction of each right edge
-    std::span<double> edge_sin_;
-    std::span<std::uint16_t> things_;         // [class 2, 3][sector][inverse range bin]
-    std::span<std::uint32_t> ground_seen_;    // [sector][inverse range bin]
-    std::span<std::uint32_t> ground_likely_;  // the same, whatever the class
-    std::span<std::uint32_t> known_;          // [sector]
-    std::span<std::uint32_t> below_;          // [sector]
+    std::span<Edge> edges_;  // right edges
+    std::span<Edge> middles_;
+    std::span<Nearest> obstacles_;    // [sector]
+    std::span<Nearest> drops_;        // [sector]
+    std::span<Stretch> ground_;       // [sector][stretch], rows below the horizon
+    std::span<std::uint32_t> known_;  // [sector]
+    std::span<std::uint32_t> below_;  // [sector]
 };
 
 }  // namespace groundline::terrain

@@ -78,7 +78,7 @@ struct Pair {
         classifier.classify(map, ground, terrain::GroundUse::kOwn, finder.surface(), mask, obstacles,
                             range_limit_m, serial);
     }
-    void find_sectors() { sector_finder.find(map, ground, mask, sectors); }
+    void find_sectors() { sector_finder.find(map, ground, mask, range_limit_m, sectors); }
 };
 
 // What each part takes, in the order of a frame; the totals hold their parts and what lies between them.

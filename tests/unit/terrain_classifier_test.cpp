@@ -588,7 +588,7 @@ TEST(Terrain, AllocatesNothingPerFrame) {
         finder.find(map, v_disparity, serial, nullptr, evidence, ground);
         classifier.classify(map, ground, GroundUse::kOwn, finder.surface(), mask, obstacles, range_limit_m,
                             serial);
-        sector_finder.find(map, ground, mask, sectors);
+        sector_finder.find(map, ground, mask, range_limit_m, sectors);
         shares_of(mask, share);
         EXPECT_EQ(test::allocations(), before) << kind;
         EXPECT_EQ(ground.found, kind != 2);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <utility>
 
 #include "core/error.hpp"
 #include "terrain/classifier.hpp"
@@ -12,6 +13,7 @@ namespace groundline::terrain {
 namespace {
 
 using test::pose_deg;
+using test::Rays;
 using test::rig_of;
 using test::World;
 
@@ -47,7 +49,7 @@ struct Bench {
         FixedVector<Obstacle, kMaxObstacles> obstacles;
         Serial serial;
         classifier.classify(map, ground, GroundUse::kOwn, surface, mask, obstacles, range_limit_m, serial);
-        finder.find(map, ground, mask, sectors);
+        finder.find(map, ground, mask, range_limit_m, sectors);
     }
     const Sector& at(double bearing_rad) const {
         for (const Sector& sector : sectors)
@@ -141,8 +143,9 @@ TEST(Sectors, DropIsAThingToo) {
         EXPECT_EQ(sector.kind, TerrainClass::kDrop);
         EXPECT_GT(sector.nearest_m, 2.4);
         EXPECT_LT(sector.nearest_m, 4.2 / std::cos(sector.bearing_rad));
-        // Rays that pass the near edge meet the far wall less than the tolerance below the ground first.
-        EXPECT_LT(sector.free_range_m, 3.6 / std::cos(sector.bearing_rad));
+        const double straight = std::max(0.0, std::fabs(sector.bearing_rad) - 0.5 * sector.width_rad);
+        EXPECT_LT(sector.free_range_m, 2.5 / std::cos(straight));
+        EXPECT_GT(sector.free_range_m, 2.2 / std::cos(sector.bearing_rad));
     }
 }
 
@@ -155,20 +158,166 @@ TEST(Sectors, UnknownGroundEndsWhatIsFree) {
     for (int v = 330; v < 380; ++v)
         for (int u = 0; u < bench.rig.width; ++u)
             bench.mask.at(u, v) = TerrainClass::kUnknown;
-    bench.finder.find(bench.map, bench.ground, bench.mask, bench.sectors);
+    bench.finder.find(bench.map, bench.ground, bench.mask, bench.range_limit_m, bench.sectors);
     // Row 380 sees the ground at h cos / (tan-like) : d = beta (v - v_h).
     const double d_px = bench.ground.plane.at(bench.rig.cx_px, 380);
     const double range = 60.0 / d_px;
     EXPECT_GT(before, 8.0);
-    EXPECT_LT(bench.at(0.0).free_range_m, range * 1.15);
-    EXPECT_GT(bench.at(0.0).free_range_m, range * 0.7);
+    EXPECT_LT(bench.at(0.0).free_range_m, range * 1.02);
+    EXPECT_GT(bench.at(0.0).free_range_m, range * 0.85);
     fill_pixels(bench.mask, TerrainClass::kUnknown);
-    bench.finder.find(bench.map, bench.ground, bench.mask, bench.sectors);
+    bench.finder.find(bench.map, bench.ground, bench.mask, bench.range_limit_m, bench.sectors);
     for (const Sector& sector : bench.sectors) {
         EXPECT_EQ(sector.free_range_m, 0.0);
         EXPECT_EQ(sector.coverage, 0.0);
         EXPECT_FALSE(sector.blocked);
     }
+}
+
+// The view begins 1.56 m before the camera's foot; from there to 2 m are 85 rows.
+struct Strip {
+    Bench bench;
+    World world{bench.rig, pose_deg(12.0, 0.0, 1.2), {}};
+
+    explicit Strip(double stopping_distance_m = 2.0) : bench(config_of(stopping_distance_m)) {
+        bench.see(world);
+    }
+    static TerrainConfig config_of(double stopping_distance_m) {
+        TerrainConfig config;
+        config.stopping_distance_m = stopping_distance_m;
+        return config;
+    }
+    double range_of(int row) const {
+        const Rays rays(world);
+        double along[3];
+        rays.direction(bench.rig.cx_px, row, along);
+        return world.pose.height_m * along[0] / along[2];
+    }
+    // Where ground straight ahead lies between these ranges.
+    template <typename Change>
+    void change(double from_m, double to_m, Change&& with) {
+        for (int v = 0; v < bench.rig.height; ++v) {
+            const double range = range_of(v);
+            if (range <= 0.0 || range < from_m || range > to_m) continue;
+            for (int u = 0; u < bench.rig.width; ++u)
+                with(u, v);
+        }
+    }
+    void hide(double from_m, double to_m) {
+        change(from_m, to_m, [&](int u, int v) { bench.mask.at(u, v) = TerrainClass::kUnknown; });
+    }
+    const Sector& ahead() {
+        bench.finder.find(bench.map, bench.ground, bench.mask, bench.range_limit_m, bench.sectors);
+        return bench.at(0.02);
+    }
+};
+
+TEST(Sectors, GapBlocksInsideTheStoppingDistance) {
+    Strip strip;
+    strip.hide(1.8, 2.2);
+    const Sector& sector = strip.ahead();
+    ASSERT_TRUE(sector.blocked);
+    EXPECT_EQ(sector.kind, TerrainClass::kUnknown);
+    EXPECT_NEAR(sector.nearest_m, 1.8, 0.02);
+    EXPECT_GT(sector.nearest_sigma_m, 0.0);
+    EXPECT_LT(sector.free_range_m, 1.8);
+    EXPECT_GT(sector.free_range_m, 1.7);
+}
+
+TEST(Sectors, GapBeyondTheStoppingDistanceOnlyEndsWhatIsFree) {
+    Strip strip(1.5);
+    strip.hide(1.8, 2.2);
+    const Sector& sector = strip.ahead();
+    EXPECT_FALSE(sector.blocked);
+    EXPECT_LT(sector.free_range_m, 1.8);
+    EXPECT_GT(sector.free_range_m, 1.7);
+}
+
+TEST(Sectors, AShortHoleInWhatIsSeenIsNoGap) {
+    Strip strip;
+    const double free_range_m = strip.ahead().free_range_m;
+    strip.hide(1.70, 1.72);
+    EXPECT_FALSE(strip.ahead().blocked);
+    EXPECT_DOUBLE_EQ(strip.ahead().free_range_m, free_range_m);
+}
+
+// Three fifths of every stretch: too little to be free, too much for a gap.
+TEST(Sectors, HalfSeenGroundIsNeitherFreeNorAGap) {
+    Strip strip;
+    strip.change(1.7, 2.2, [&](int u, int v) {
+        if ((u / 4 + 2 * v) % 5 < 2) strip.bench.mask.at(u, v) = TerrainClass::kUnknown;
+    });
+    EXPECT_FALSE(strip.ahead().blocked);
+    EXPECT_LT(strip.ahead().free_range_m, 1.7);
+    EXPECT_GT(strip.ahead().free_range_m, 1.6);
+}
+
+TEST(Sectors, GroundNotSeenAtTheNearEdgeIsNoGap) {
+    Strip strip;
+    strip.hide(0.0, 1.7);
+    EXPECT_FALSE(strip.ahead().blocked);
+    EXPECT_EQ(strip.ahead().free_range_m, 0.0);
+}
+
+TEST(Sectors, RobotsOwnPartsAreNeitherNearEdgeNorGap) {
+    for (const auto& [from_m, to_m] : {std::pair{0.0, 1.7}, std::pair{1.7, 1.95}}) {
+        Strip strip;
+        const double free_range_m = strip.ahead().free_range_m;
+        const double coverage = strip.ahead().coverage;
+        strip.hide(from_m, to_m);
+        strip.change(from_m, to_m, [&](int u, int v) { strip.bench.map.invalid.at(u, v) = Invalid::kBody; });
+        EXPECT_FALSE(strip.ahead().blocked);
+        EXPECT_DOUBLE_EQ(strip.ahead().free_range_m, free_range_m);
+        EXPECT_NEAR(strip.ahead().coverage, coverage, 0.1);
+    }
+}
+
+// Its far wall is less than the tolerance below the ground, so all of it is class 1; 0.28 m of ground are not
+// seen all the same.
+TEST(Sectors, LipEndsWhatIsFreeThoughNothingBehindItIsADrop) {
+    Strip strip;
+    strip.world.ditch_from_m = 1.8;
+    strip.world.ditch_to_m = 2.08;
+    strip.world.ditch_depth_m = 1.0;
+    strip.bench.see(strip.world, {0.1, 0.0, 0.0, 3});
+    const Sector& sector = strip.ahead();
+    ASSERT_TRUE(sector.blocked);
+    EXPECT_EQ(sector.kind, TerrainClass::kUnknown);
+    EXPECT_NEAR(sector.nearest_m, 1.8, 0.05);
+    EXPECT_LT(sector.free_range_m, 1.8);
+}
+
+TEST(Sectors, GapBeforeAThingIsTheThings) {
+    Strip strip;
+    strip.world.boxes.push_back({1.9, 0.0, 0.8, 0.5, 0.6});
+    strip.bench.see(strip.world, {0.1, 0.0, 0.0, 3});
+    ASSERT_TRUE(strip.ahead().blocked);
+    EXPECT_EQ(strip.ahead().kind, TerrainClass::kObstacle);
+    // Not so a gap well before it.
+    strip.hide(1.62, 1.75);
+    ASSERT_TRUE(strip.ahead().blocked);
+    EXPECT_EQ(strip.ahead().kind, TerrainClass::kUnknown);
+    EXPECT_NEAR(strip.ahead().nearest_m, 1.62, 0.02);
+}
+
+// Holes in obstacles are closed in the mask; they have no range.
+TEST(Sectors, PixelsWithoutDisparityHaveNoRange) {
+    Bench bench;
+    World world{bench.rig, pose_deg(12.0, 0.0, 1.2), {}};
+    world.boxes.push_back({5.0, 0.0, 1.0, 0.5, 0.8});
+    bench.see(world);
+    const double nearest_m = bench.at(0.0).nearest_m;
+    int holes = 0;
+    for (int v = 0; v < bench.rig.height; ++v)
+        for (int u = 0; u < bench.rig.width; ++u) {
+            if (bench.mask.at(u, v) != TerrainClass::kObstacle || (u / 4 + v / 4) % 2 == 0) continue;
+            bench.map.invalid.at(u, v) = Invalid::kTexture;
+            bench.map.disparity_q4.at(u, v) = 16 * 90;  // would be 0.7 m
+            ++holes;
+        }
+    ASSERT_GT(holes, 1000);
+    bench.finder.find(bench.map, bench.ground, bench.mask, bench.range_limit_m, bench.sectors);
+    EXPECT_NEAR(bench.at(0.0).nearest_m, nearest_m, 0.02);
 }
 
 TEST(Sectors, RangeEdgePixelsBlockAtTheNearestRange) {
@@ -185,7 +334,7 @@ TEST(Sectors, RangeEdgePixelsBlockAtTheNearestRange) {
     Serial serial;
     bench.classifier.classify(bench.map, bench.ground, GroundUse::kOwn, bench.surface, bench.mask, obstacles,
                               bench.range_limit_m, serial);
-    bench.finder.find(bench.map, bench.ground, bench.mask, bench.sectors);
+    bench.finder.find(bench.map, bench.ground, bench.mask, bench.range_limit_m, bench.sectors);
     ASSERT_EQ(obstacles.size(), 1U);
     EXPECT_NEAR(obstacles[0].range_m, 60.0 / 95.0, 0.01);
     EXPECT_TRUE(bench.at(0.0).blocked);
@@ -199,16 +348,16 @@ TEST(Sectors, AreEmptyWithoutMetresOrGround) {
     ASSERT_FALSE(bench.sectors.empty());
     Ground ground = bench.ground;
     ground.found = false;
-    bench.finder.find(bench.map, ground, bench.mask, bench.sectors);
+    bench.finder.find(bench.map, ground, bench.mask, bench.range_limit_m, bench.sectors);
     EXPECT_TRUE(bench.sectors.empty());
     ground = bench.ground;
     ground.metric = false;
-    bench.finder.find(bench.map, ground, bench.mask, bench.sectors);
+    bench.finder.find(bench.map, ground, bench.mask, bench.range_limit_m, bench.sectors);
     EXPECT_TRUE(bench.sectors.empty());
     RectifiedRig unknown = bench.rig;
     unknown.calibrated = false;
     SectorFinder finder(TerrainConfig{}, unknown, 0, kDisparities, bench.arena);
-    finder.find(bench.map, bench.ground, bench.mask, bench.sectors);
+    finder.find(bench.map, bench.ground, bench.mask, bench.range_limit_m, bench.sectors);
     EXPECT_TRUE(bench.sectors.empty());
 }
 
