@@ -55,6 +55,7 @@ struct Sector {
     // An obstacle or a drop was seen, or a gap inside the stopping distance: ground seen nearer, then none
     // (unseen, hidden, or a lip behind which it falls away). Ground never seen is no gap.
     bool blocked = false;
+    bool held = false;  // blocked by what earlier frames saw: kind and nearest are theirs
     TerrainClass kind = TerrainClass::kUnknown;  // of the nearest such; a gap is unknown
     double nearest_m = 0.0;                      // to it, where blocked; of a gap its near edge
     double nearest_sigma_m = 0.0;

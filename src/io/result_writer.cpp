@@ -112,6 +112,7 @@ void append_sector(std::string& line, const Sector& sector) {
     object.number("bearing_deg", det::degrees(sector.bearing_rad), 4);
     object.number("width_deg", det::degrees(sector.width_rad), 4);
     object.key("blocked") += sector.blocked ? "true" : "false";
+    object.key("held") += sector.held ? "true" : "false";
     object.word("kind", kTerrainClassNames[static_cast<std::size_t>(sector.kind)]);
     object.number_or_null("nearest_m", sector.blocked, sector.nearest_m, 4);
     object.number_or_null("sigma_m", sector.blocked, sector.nearest_sigma_m, 4);

@@ -61,6 +61,7 @@ Processor::Processor(const ProcessorConfig& config, const rig::Rectifier& rectif
       classifier_(config.terrain, rectifier.rig(), matcher_->min_disparity(), matcher_->disparities(), arena),
       sector_finder_(config.terrain, rectifier.rig(), matcher_->min_disparity(), matcher_->disparities(),
                      arena),
+      persistence_(config.terrain),
       right_(arena.image<std::uint8_t>(rectifier.rig().width, rectifier.rig().height)),
       unusable_left_(unusable(rectifier.outside_left(), config.body, rectifier.rig(), arena)),
       unusable_right_(unusable(rectifier.outside_right(), {}, rectifier.rig(), arena)),
@@ -126,6 +127,7 @@ void Processor::process(const StereoFrame& frame, FrameResult& result) {
     classifier_.classify(result.disparity, result.ground, decision.use, ground_finder_.surface(), result.mask,
                          result.obstacles, result.range_limit_m, parallel_);
     sector_finder_.find(result.disparity, result.ground, result.mask, result.range_limit_m, result.sectors);
+    persistence_.apply(now_mono_ns, result.verdict, result.sectors);
     if (elevation_grid_) elevation_grid_->find(result.disparity, result.ground, result.mask, result.grid);
     terrain::shares_of(result.mask, result.share);
     clock.end(Stage::kClassify);

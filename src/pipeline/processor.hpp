@@ -16,6 +16,7 @@
 #include "terrain/config.hpp"
 #include "terrain/elevation_grid.hpp"
 #include "terrain/ground_finder.hpp"
+#include "terrain/persistence.hpp"
 #include "terrain/sectors.hpp"
 #include "verdict/verdict.hpp"
 
@@ -60,6 +61,7 @@ class Processor {
     terrain::GroundFinder ground_finder_;
     terrain::Classifier classifier_;
     terrain::SectorFinder sector_finder_;
+    terrain::Persistence persistence_;
     std::optional<terrain::ElevationGrid> elevation_grid_;  // where the configuration asks for it
     Luma right_;
     // Where the window of a match would reach beyond the source picture or into the robot's own parts: the

@@ -226,6 +226,7 @@ MessageEncoder::Bytes MessageEncoder::sectors(const FrameResult& result) {
         to.bearing_rad = wire(from.bearing_rad);
         to.width_rad = wire(from.width_rad);
         to.blocked = static_cast<std::int8_t>(blocked);
+        to.held = static_cast<std::int8_t>(blocked && from.held);
         to.kind = static_cast<std::int8_t>(blocked ? from.kind : TerrainClass::kUnknown);
         to.nearest_m = wire_if(blocked, from.nearest_m);
         to.nearest_sigma_m = wire_if(blocked, from.nearest_sigma_m);

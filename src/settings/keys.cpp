@@ -270,6 +270,12 @@ std::vector<Key> make_keys() {
     keys.push_back(whole("terrain.sectors", 1, static_cast<int>(kMaxSectors),
                          "Bearing sectors the field of view is cut into.",
                          GROUNDLINE_MEMBER(terrain.sectors)));
+    keys.push_back(
+        whole("terrain.clear_frames", 1, 32,
+              "Frames without an obstacle or drop, of the last clear_window, that clear its sector.",
+              GROUNDLINE_MEMBER(terrain.clear_frames)));
+    keys.push_back(whole("terrain.clear_window", 1, 32, "Frames that clear_frames are counted among.",
+                         GROUNDLINE_MEMBER(terrain.clear_window)));
 
     keys.push_back(optional_number("mount.height_m", 0.05, 20.0,
                                    "Height of the left camera above the ground.",

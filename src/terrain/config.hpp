@@ -56,6 +56,11 @@ struct TerrainConfig {
     double mount_yaw_deg = 0.0;
     int sectors = 32;  // 1..kMaxSectors; 32 over 80 deg are 2.5 deg each, a person at 15 m
 
+    // What was seen in a sector is held until it was absent in so many of so many frames. 1 <= frames <= window
+    // <= 32; frames = 1 holds nothing.
+    int clear_frames = 2;
+    int clear_window = 3;
+
     // One sigma of a valid pixel's disparity: 0.25 px is what sub-pixel matching reaches on real pictures,
     // integer disparities have 0.3 px from rounding alone.
     double sigma_disparity_px = 0.25;

@@ -1,6 +1,7 @@
 #include "terrain/sectors.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cassert>
 #include <cmath>
 #include <cstring>
@@ -13,11 +14,13 @@
 namespace groundline::terrain {
 namespace {
 
-constexpr double kNone = std::numeric_limits<double>::infinity();
 constexpr int kRows = 3;        // of the picture make a stretch
 constexpr int kThingStep = 2;   // rows and columns
 constexpr int kGroundStep = 4;  // columns
-constexpr int kFraction = 16;   // bits of a stretch's number while walking along a row
+constexpr int kPerOctave = 32;
+constexpr int kSpan = 8;              // bins: a fifth of the range
+constexpr std::uint32_t kEnough = 4;  // samples that make a thing
+constexpr int kFraction = 16;         // bits of a stretch's number while walking along a row
 // What is well seen, and what is a gap. Ground of little texture has holes, so not all of it need be seen;
 // half of a stretch over a thin ditch is ground before or behind it.
 constexpr double kWell = 0.75;
@@ -30,6 +33,19 @@ constexpr double kJumpSigmas = 6.0;  // of disparity; disparities scatter, and g
 // drop.
 constexpr double kMarginRows = 3.0;
 constexpr double kMarginSigmas = 1.0;  // of disparity: how well one pixel's row of ground is known
+
+// By true disparity in 1/16 px, linear within an octave; below one pixel all is bin 0.
+constexpr int bin_of(int disparity_q4) {
+    const auto value = static_cast<std::uint32_t>(disparity_q4);
+    const int octave = std::bit_width(value) - 1;
+    if (octave < 4) return 0;
+    const auto part = static_cast<int>((value << 5U) >> static_cast<unsigned>(octave)) - kPerOctave;
+    return (octave - 4) * kPerOctave + part;
+}
+constexpr double pixels_of(int bin) {
+    return static_cast<double>(1 << (bin / kPerOctave)) *
+           (1.0 + static_cast<double>(bin % kPerOctave) / kPerOctave);
+}
 
 }  // namespace
 
@@ -50,15 +66,15 @@ SectorFinder::SectorFinder(const TerrainConfig& config, const RectifiedRig& rig,
       rig_(rig),
       last_disparity_(min_disparity + disparities - 1),
       count_(config.sectors),
-      stretches_(2 * rig.height / kRows + 1) {
+      stretches_(2 * rig.height / kRows + 1),
+      bins_(bin_of(std::max(1, last_disparity_ + 1) * 2 * kDisparityOne) + 1) {
     if (config.sectors < 1 || config.sectors > static_cast<int>(kMaxSectors))
         throw Refusal(ExitStatus::kConfig, "there can be 1 to " + std::to_string(kMaxSectors) +
                                                " sectors, not " + std::to_string(config.sectors));
     const auto sectors = static_cast<std::size_t>(count_);
     edges_ = arena.take<Edge>(sectors);
     middles_ = arena.take<Edge>(sectors);
-    obstacles_ = arena.take<Nearest>(sectors);
-    drops_ = arena.take<Nearest>(sectors);
+    things_ = arena.take<Depth>(2 * sectors * static_cast<std::size_t>(bins_));
     ground_ = arena.take<Stretch>(sectors * static_cast<std::size_t>(stretches_));
     known_ = arena.take<std::uint32_t>(sectors);
     below_ = arena.take<std::uint32_t>(sectors);
@@ -104,14 +120,51 @@ int SectorFinder::sector_of(double x, double y, int guess) const {
     return guess;
 }
 
+std::span<SectorFinder::Depth> SectorFinder::things_of(TerrainClass kind, int sector) const {
+    const int row = kind == TerrainClass::kObstacle ? sector : count_ + sector;
+    return things_.subspan(static_cast<std::size_t>(row) * static_cast<std::size_t>(bins_),
+                           static_cast<std::size_t>(bins_));
+}
+
+// False where there is none.
+bool SectorFinder::nearest(TerrainClass kind, int sector, const View& view, double& range_m,
+                           double& sigma_m) const {
+    const std::span<const Depth> depths = things_of(kind, sector);
+    // The metres of a pixel are b / d.
+    const double per_area = 1.0 / (kThingStep * kThingStep * rig_.baseline_m * rig_.baseline_m);
+    const double least = 0.25 * config_.min_area_m2 * per_area;
+    std::uint32_t within = 0;
+    std::uint32_t most = 0;
+    int found = -1;
+    for (int bin = bins_ - 1; bin >= 0; --bin) {
+        within += depths[static_cast<std::size_t>(bin)].count;
+        if (bin + kSpan < bins_) within -= depths[static_cast<std::size_t>(bin + kSpan)].count;
+        const bool large = within >= kEnough && within >= least * pixels_of(bin) * pixels_of(bin);
+        if (large || within > most) {
+            most = within;
+            found = bin;
+        }
+        if (large) break;
+    }
+    if (found < 0) return false;
+    // Of those, the 4th-nearest.
+    int bin = std::min(found + kSpan, bins_) - 1;
+    for (std::uint32_t passed = 0;; --bin) {
+        passed += depths[static_cast<std::size_t>(bin)].count;
+        if (passed >= std::min(kEnough, most)) break;
+    }
+    const float square = depths[static_cast<std::size_t>(bin)].nearest_square;
+    range_m = std::sqrt(static_cast<double>(square));
+    sigma_m = range_m * range_m * config_.sigma_disparity_px / view.scale;
+    return true;
+}
+
 void SectorFinder::collect_things(ConstDisparityMap map, const View& view, ConstMask mask) {
-    Nearest none;
-    none.fill(kNone);
-    std::fill(obstacles_.begin(), obstacles_.end(), none);
-    std::fill(drops_.begin(), drops_.end(), none);
+    std::fill(things_.begin(), things_.end(), Depth{0, std::numeric_limits<float>::max()});
     // Obstacle and drop are the classes with the second bit set.
     constexpr std::uint64_t kThing = 0x0202020202020202U;
     const BodyFrame& body = view.body;
+    const double offset_q4 = view.offset_px * kDisparityOne;
     for (int v = 0; v < mask.height; v += kThingStep) {
         const TerrainClass* kinds = mask.row(v);
         const std::int16_t* disparity = map.disparity_q4.row(v);
@@ -125,20 +178,17 @@ void SectorFinder::collect_things(ConstDisparityMap map, const View& view, Const
             for (int u = from; u < to; u += kThingStep) {
                 if (kinds[u] != TerrainClass::kObstacle && kinds[u] != TerrainClass::kDrop) continue;
                 if (invalid[u] != Invalid::kNone && invalid[u] != Invalid::kRangeEdge) continue;
-                const double measured_px = invalid[u] == Invalid::kRangeEdge
-                                               ? last_disparity_
-                                               : disparity[u] * (1.0 / kDisparityOne);
-                const double depth = view.scale / std::max(measured_px - view.offset_px, 1.0 / kDisparityOne);
+                const int measured_q4 =
+                    invalid[u] == Invalid::kRangeEdge ? last_disparity_ * kDisparityOne : disparity[u];
+                const double true_q4 = std::max(measured_q4 - offset_q4, 1.0);
+                const double depth = view.scale * kDisparityOne / true_q4;
                 const double x = body.x_m + depth * body.along_x(u, v);
                 const double y = body.y_m + depth * body.along_y(u, v);
                 sector = sector_of(x, y, sector);
-                double square = x * x + y * y;
-                Nearest& nearest =
-                    (kinds[u] == TerrainClass::kObstacle ? obstacles_
-                                                         : drops_)[static_cast<std::size_t>(sector)];
-                if (square >= nearest.back()) continue;
-                for (double& each : nearest)
-                    if (square < each) std::swap(square, each);
+                const int bin = std::min(bin_of(static_cast<int>(true_q4)), bins_ - 1);
+                Depth& cell = things_of(kinds[u], sector)[static_cast<std::size_t>(bin)];
+                ++cell.count;
+                cell.nearest_square = std::min(cell.nearest_square, static_cast<float>(x * x + y * y));
             }
         }
     }
@@ -300,16 +350,14 @@ void SectorFinder::find(ConstDisparityMap map, const Ground& ground, ConstMask m
         sector.bearing_rad = first_bearing_rad_ - (i + 0.5) * width_rad_;
         sector.width_rad = width_rad_;
         for (const TerrainClass kind : {TerrainClass::kObstacle, TerrainClass::kDrop}) {
-            const Nearest& nearest = kind == TerrainClass::kObstacle ? obstacles_[at] : drops_[at];
-            // The last where there are fewer.
-            const auto last = std::find(nearest.begin(), nearest.end(), kNone);
-            if (last == nearest.begin()) continue;
-            const double range = std::sqrt(*(last - 1));
+            double range = 0.0;
+            double sigma = 0.0;
+            if (!nearest(kind, i, view, range, sigma)) continue;
             if (sector.blocked && range >= sector.nearest_m) continue;
             sector.blocked = true;
             sector.kind = kind;
             sector.nearest_m = range;
-            sector.nearest_sigma_m = range * range * config_.sigma_disparity_px / view.scale;
+            sector.nearest_sigma_m = sigma;
         }
         judge_ground(view, i, range_limit_m, sector);
         if (sector.blocked) sector.free_range_m = std::min(sector.free_range_m, sector.nearest_m);

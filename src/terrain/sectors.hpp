@@ -1,7 +1,6 @@
 // What is known per bearing about the robot: nearest thing, and how far ground was really seen.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <span>
 
@@ -29,9 +28,10 @@ class SectorFinder {
     // metres, or the rig is not calibrated. `range_limit_m` is the classifier's. Ranges are along the ground
     // from the body's origin.
     //
-    // Things: nearest_m is to the 4th-nearest sampled pixel of class 2 or 3 that has a disparity, so that no
-    // single pixel decides; range-edge pixels count at the nearest range searched. Every second pixel of
-    // every second row is sampled.
+    // Things: nearest_m is to where a quarter of the least visible area of a thing, and 4 sampled pixels, lie
+    // within a fifth of one range; so a few pixels matched wrongly within a thing decide nothing. Where
+    // nothing is that large, to where most samples are. Pixels of class 2 or 3 that have a disparity count,
+    // every second of every second row; range-edge pixels at the nearest range searched.
     //
     // Ground: the rows that show it are taken in stretches of 3, from the near edge of the view on. That edge
     // is where the picture begins that is not the robot itself; ground nearer than the search range is left
@@ -48,9 +48,11 @@ class SectorFinder {
               FixedVector<Sector, kMaxSectors>& sectors);
 
   private:
-    static constexpr int kEnough = 4;  // sampled pixels that make a thing
-    // The nearest of the pixels sampled, squared ranges in rising order.
-    using Nearest = std::array<double, kEnough>;
+    // Samples of a thing by disparity, 32 bins an octave.
+    struct Depth {
+        std::uint32_t count;
+        float nearest_square;  // squared range, m2
+    };
     struct Stretch {
         std::uint16_t likely;   // samples where the ground would be seen
         std::uint16_t seen;     // of those, class 1
@@ -69,6 +71,8 @@ class SectorFinder {
 
     View view_of(const Ground& ground) const;
     int sector_of(double x, double y, int guess) const;
+    std::span<Depth> things_of(TerrainClass kind, int sector) const;
+    bool nearest(TerrainClass kind, int sector, const View& view, double& range_m, double& sigma_m) const;
     void collect_things(ConstDisparityMap map, const View& view, ConstMask mask);
     void count_ground(ConstDisparityMap map, const View& view, ConstMask mask);
     int first_gap(std::span<const Stretch> stretches, double rows, int from, double least_seen,
@@ -80,12 +84,12 @@ class SectorFinder {
     int last_disparity_;
     int count_;
     int stretches_;
+    int bins_;
     double first_bearing_rad_ = 0.0;  // left edge of the leftmost sector
     double width_rad_ = 0.0;
     std::span<Edge> edges_;  // right edges
     std::span<Edge> middles_;
-    std::span<Nearest> obstacles_;    // [sector]
-    std::span<Nearest> drops_;        // [sector]
+    std::span<Depth> things_;         // [class 2, 3][sector][bin]
     std::span<Stretch> ground_;       // [sector][stretch], rows below the horizon
     std::span<std::uint32_t> known_;  // [sector]
     std::span<std::uint32_t> below_;  // [sector]

@@ -40,7 +40,7 @@ void fill_line(HandMade& made) {
     Sector blocked;
     blocked.bearing_rad = det::radians(10.0);
     blocked.width_rad = det::radians(5.0);
-    blocked.blocked = true;
+    blocked.blocked = blocked.held = true;
     blocked.kind = TerrainClass::kObstacle;
     blocked.nearest_m = 3.25;
     blocked.nearest_sigma_m = 0.0625;
@@ -48,7 +48,7 @@ void fill_line(HandMade& made) {
     blocked.coverage = 0.75;
     Sector open = blocked;
     open.bearing_rad = det::radians(-10.0);
-    open.blocked = false;
+    open.blocked = open.held = false;
     open.kind = TerrainClass::kUnknown;
     result.sectors.push_back(blocked);
     result.sectors.push_back(open);
@@ -60,9 +60,9 @@ constexpr const char* kGoldenLine =
     R"("ground":{"plane":[0.001000000,0.250000000,-12.500000],"pitch_deg":1.500000,"roll_deg":-2.000000,)"
     R"("height_m":1.650000,"sigma":{"pitch_deg":0.125000,"roll_deg":0.250000,"height_m":0.015625}},)"
     R"("share":{"unknown":0.500000,"traversable":0.250000,"obstacle":0.125000,"drop":0.125000},)"
-    R"("sectors":[{"bearing_deg":10.0000,"width_deg":5.0000,"blocked":true,"kind":"obstacle",)"
+    R"("sectors":[{"bearing_deg":10.0000,"width_deg":5.0000,"blocked":true,"held":true,"kind":"obstacle",)"
     R"("nearest_m":3.2500,"sigma_m":0.0625,"free_range_m":3.0000,"coverage":0.750000},)"
-    R"({"bearing_deg":-10.0000,"width_deg":5.0000,"blocked":false,"kind":"unknown",)"
+    R"({"bearing_deg":-10.0000,"width_deg":5.0000,"blocked":false,"held":false,"kind":"unknown",)"
     R"("nearest_m":null,"sigma_m":null,"free_range_m":3.0000,"coverage":0.750000}]})";
 
 constexpr const char* kGoldenWithoutGround =

@@ -62,8 +62,8 @@ struct Frame {
         result.reasons.add(Reason::kNoMountPrior);
         result.share = {0.5, 0.25, 0.125, 0.125};
         result.range_limit_m = 11.5;
-        result.sectors.push_back({0.25, 0.5, true, TerrainClass::kDrop, 3.5, 0.125, 2.5, 0.75});
-        result.sectors.push_back({-0.25, 0.5, false, TerrainClass::kUnknown, 0.0, 0.0, 6.5, 1.0});
+        result.sectors.push_back({0.25, 0.5, true, true, TerrainClass::kDrop, 3.5, 0.125, 2.5, 0.75});
+        result.sectors.push_back({-0.25, 0.5, false, false, TerrainClass::kUnknown, 0.0, 0.0, 6.5, 1.0});
         result.grid.cells = arena.take<GridCell>(6);
         result.grid.rows = 2;
         result.grid.columns = 3;

@@ -300,6 +300,23 @@ TEST(Sectors, GapBeforeAThingIsTheThings) {
     EXPECT_NEAR(strip.ahead().nearest_m, 1.62, 0.02);
 }
 
+// 36 pixels at 0.8 m are 1 cm2, too few to be a thing of their own.
+TEST(Sectors, APatchMatchedWronglyWithinAThingDecidesNothing) {
+    Bench bench;
+    World world{bench.rig, pose_deg(12.0, 0.0, 1.2), {}};
+    world.boxes.push_back({5.0, 0.0, 1.0, 0.5, 0.8});
+    bench.see(world);
+    const double nearest_m = bench.at(0.01).nearest_m;
+    const int v = static_cast<int>(bench.rig.cy_px) + 10;
+    const int u = static_cast<int>(bench.rig.cx_px - 0.01 * bench.rig.focal_px);
+    ASSERT_EQ(bench.mask.at(u, v), TerrainClass::kObstacle);
+    for (int row = v; row < v + 6; ++row)
+        for (int column = u; column < u + 6; ++column)
+            bench.map.disparity_q4.at(column, row) = 16 * 75;
+    bench.finder.find(bench.map, bench.ground, bench.mask, bench.range_limit_m, bench.sectors);
+    EXPECT_NEAR(bench.at(0.01).nearest_m, nearest_m, 0.02);
+}
+
 // Holes in obstacles are closed in the mask; they have no range.
 TEST(Sectors, PixelsWithoutDisparityHaveNoRange) {
     Bench bench;
