@@ -16,7 +16,8 @@ namespace {
 
 constexpr int kRows = 3;        // of the picture make a stretch
 constexpr int kThingStep = 2;   // rows and columns
-constexpr int kGroundStep = 4;  // columns
+constexpr int kGroundStep = 2;  // columns
+constexpr int kRowStep = 2;
 constexpr int kPerOctave = 32;
 constexpr int kSpan = 8;              // bins: a fifth of the range
 constexpr std::uint32_t kEnough = 4;  // samples that make a thing
@@ -210,7 +211,8 @@ void SectorFinder::count_ground(ConstDisparityMap map, const View& view, ConstMa
         middle.beyond = mix(view.x, middle.cosine, view.y, middle.sine);
     const double per_row = view.rows / kRows;
     const double most = stretches_ - 1;
-    for (int v = 0; v < mask.height; ++v) {
+    for (int v = 0; v < mask.height; v += kRowStep) {
+        if (view.ground.at(0, v) < 1.0 && view.ground.at(mask.width - 1, v) < 1.0) continue;
         const TerrainClass* kinds = mask.row(v);
         const Invalid* invalid = map.invalid.row(v);
         const std::int16_t* disparity = map.disparity_q4.row(v);

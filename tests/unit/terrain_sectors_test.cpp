@@ -307,7 +307,7 @@ TEST(Sectors, APatchMatchedWronglyWithinAThingDecidesNothing) {
     world.boxes.push_back({5.0, 0.0, 1.0, 0.5, 0.8});
     bench.see(world);
     const double nearest_m = bench.at(0.01).nearest_m;
-    const int v = static_cast<int>(bench.rig.cy_px) + 10;
+    const int v = static_cast<int>(bench.rig.cy_px) - 40;
     const int u = static_cast<int>(bench.rig.cx_px - 0.01 * bench.rig.focal_px);
     ASSERT_EQ(bench.mask.at(u, v), TerrainClass::kObstacle);
     for (int row = v; row < v + 6; ++row)
