@@ -124,6 +124,10 @@ TEST(Persistence, FollowsWhatMovesAndTakesWhatIsNearerAtOnce) {
     EXPECT_EQ(nearer.nearest_m, 2.0);
     // The nearer one was never absent before.
     EXPECT_TRUE(drive.frame({free_to()})[0].held);
+    drive.persistence.reset();
+    drive.frame({thing_at(4.0)});
+    drive.frame({thing_at(2.0)});
+    EXPECT_EQ(drive.frame({free_to()})[0].nearest_m, 2.0);
 }
 
 TEST(Persistence, GapInTimeDropsWhatIsHeld) {
