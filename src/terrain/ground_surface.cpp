@@ -98,7 +98,8 @@ void GroundSurface::count(ConstDisparityMap map, const DisparityPlane& plane, do
 // than the plane does.
 bool GroundSurface::trace_profile(double per_row_px) {
     // Ground across the whole view would put so many pixels into half a pixel of disparity.
-    const double full = 0.5 / kStepsPerPx * 2.0 / per_row_px / kRowStep * (width_ / kColumnStep);
+    const int columns = width_ / kColumnStep;
+    const double full = 0.5 / per_row_px / kRowStep * columns;
     const auto cap = static_cast<std::int32_t>(std::max(16.0, 0.5 * full));
     for (std::size_t step = 0; step < static_cast<std::size_t>(steps_); ++step)
         for (std::size_t j = 0; j < kHeights; ++j) {

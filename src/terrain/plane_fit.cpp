@@ -66,6 +66,8 @@ kernels::Samples PlaneFit::Set::samples(std::size_t first, std::size_t count) co
 void PlaneFit::take(Arena& arena, int width, int height) {
     width_ = width;
     height_ = height;
+    middle_u_ = width / 2;
+    middle_v_ = height / 2;
     tile_columns_ = (width + kTile - 1) / kTile;
     tile_rows_ = (height + kTile - 1) / kTile;
     const auto count = [&](int step_u, int step_v) {
@@ -90,8 +92,8 @@ void PlaneFit::sample(ConstDisparityMap map, double offset_px) {
     offset_px_ = offset_px;
     rough_.used = thin_.used = dense_.used = 0;
     // Coordinates from the middle, where floats of the sums lose least.
-    const int middle_u = width_ / 2;
-    const int middle_v = height_ / 2;
+    const int middle_u = middle_u_;
+    const int middle_v = middle_v_;
     const auto each = [&](int first, int step_u, int step_v, auto put) {
         for (int v = first; v < height_; v += step_v) {
             const std::int16_t* disparity = map.disparity_q4.row(v);
@@ -113,10 +115,10 @@ void PlaneFit::sample(ConstDisparityMap map, double offset_px) {
 }
 
 DisparityPlane PlaneFit::centred(const DisparityPlane& plane) const {
-    return {plane.du, plane.dv, plane.at(width_ / 2, height_ / 2)};
+    return {plane.du, plane.dv, plane.at(middle_u_, middle_v_)};
 }
 DisparityPlane PlaneFit::uncentred(const DisparityPlane& plane) const {
-    return {plane.du, plane.dv, plane.at(-(width_ / 2), -(height_ / 2))};
+    return {plane.du, plane.dv, plane.at(-middle_u_, -middle_v_)};
 }
 
 kernels::PlaneWeights PlaneFit::weights_of(const DisparityPlane& plane, double tolerance_px) const {
@@ -197,8 +199,8 @@ PlaneFitResult PlaneFit::fit(const DisparityPlane& start, Parallel& parallel) {
 void PlaneFit::finish(PlaneFitResult& result) {
     const DisparityPlane plane = result.plane;
     kernels::PlaneMoments moments{};
-    const double middle_u = width_ / 2;
-    const double middle_v = height_ / 2;
+    const double middle_u = middle_u_;
+    const double middle_v = middle_v_;
     std::fill(tiles_.begin(), tiles_.end(), Score{});
     double slope_sum = 0.0;
     // Every second of them: doubles are slow.
@@ -213,8 +215,8 @@ void PlaneFit::finish(PlaneFitResult& result) {
         const double t2 = residual * residual / (reach * reach);
         const double weight = (1.0 - t2) * (1.0 - t2);
         const double score = weight * residual;
-        const int column = (static_cast<int>(dense_.u[i]) + width_ / 2) / kTile;
-        const int row = (static_cast<int>(dense_.v[i]) + height_ / 2) / kTile;
+        const int column = (static_cast<int>(dense_.u[i]) + middle_u_) / kTile;
+        const int row = (static_cast<int>(dense_.v[i]) + middle_v_) / kTile;
         Score& tile = tiles_[static_cast<std::size_t>(row * tile_columns_ + column)];
         tile.s += score;
         tile.su += score * u;

@@ -71,6 +71,8 @@ class PlaneFit {
 
     int width_ = 0;
     int height_ = 0;
+    int middle_u_ = 0;  // coordinates of samples are about it
+    int middle_v_ = 0;
     int tile_columns_ = 0;
     int tile_rows_ = 0;
     int step_u_ = 4;  // of the pixels of fit()
