@@ -42,7 +42,9 @@ Classifier::Classifier(const TerrainConfig& config, const RectifiedRig& rig, int
       table_(static_cast<std::size_t>(disparities) * kDisparityOne + 1),
       certified_q4_(arena.take<std::int32_t>(static_cast<std::size_t>(bands_) * kernels::kClassColumns)),
       up_q20_(arena.take<std::int32_t>(static_cast<std::size_t>(bands_) * 2 * table_)),
-      down_q20_(arena.take<std::int32_t>(up_q20_.size())) {
+      down_q20_(arena.take<std::int32_t>(up_q20_.size())),
+      even_(arena.take<kernels::EvenLimits>(static_cast<std::size_t>(bands_))),
+      is_even_(arena.take<bool>(static_cast<std::size_t>(bands_))) {
     static_assert(kernels::kClassColumns == GroundSurface::kBandColumns);
     components_.take(arena, rig.width, rig.height, min_disparity, disparities, config.min_pixels);
     outline_.take(arena, rig.width, rig.height);
@@ -116,6 +118,35 @@ double Classifier::certify_columns(const Wedge& wedge) {
     return rig_.focal_px * rig_.baseline_m / farthest_px;
 }
 
+// Whether a band's limits grow evenly with the disparity, and then these: above the plane itself, where all
+// of the band's cells allow the same and nothing overflows.
+bool Classifier::even_limits(const Wedge& wedge, GroundUse use, const GroundSurface& surface, int band,
+                             double uncertain_px, kernels::EvenLimits& limits) const {
+    constexpr double kMost = 2e9;
+    constexpr double kFactorOne = 65536.0;
+    constexpr double kOne = kFactorOne * kDisparityOne;
+    const double up = 1.0 - wedge.ratio_up;
+    const double down = 1.0 + wedge.ratio_down;
+    const double most_px = std::max(std::fabs(last_disparity_ + 1.0), std::fabs(first_q4_ / 16.0));
+    const bool flat = use == GroundUse::kHeld || surface.flat();
+    if (!flat || wedge.band || use == GroundUse::kWeak) return false;
+    if (most_px * kOne * std::max(std::fabs(up), down) > kMost) return false;
+    if (std::fabs(wedge.offset_px) * kOne * std::max(std::fabs(up), down) > kMost ||
+        uncertain_px * kOne > kMost)
+        return false;
+    for (int step = 0; step < surface.steps() && use == GroundUse::kOwn; ++step)
+        if (surface.support(step, band) == CellSupport::kContradicted) return false;
+    const auto fixed = [](double value) { return static_cast<std::int32_t>(std::floor(value + 0.5)); };
+    limits.up_q16 = fixed(up * kFactorOne);
+    limits.down_q16 = fixed(down * kFactorOne);
+    limits.up_off_q20 = fixed(wedge.offset_px * kOne * up);
+    limits.down_off_q20 = fixed(wedge.offset_px * kOne * down);
+    limits.offset_q20 = fixed(wedge.offset_px * kOne);
+    limits.uncertain_q20 = fixed(uncertain_px * kOne);
+    limits.level = use == GroundUse::kOwn;
+    return true;
+}
+
 // Limits on the ground's disparity by a pixel's own, for the columns of each band.
 void Classifier::make_limits(const Wedge& wedge, GroundUse use, const GroundSurface& surface) {
     constexpr double kOne = static_cast<double>(std::int32_t{1} << kBits) * kDisparityOne;
@@ -138,6 +169,11 @@ void Classifier::make_limits(const Wedge& wedge, GroundUse use, const GroundSurf
                 worst = std::max(worst, variance);
             }
         const double uncertain_px = config_.sigmas * std::sqrt(noise + worst);
+        if (even_limits(wedge, use, surface, band, uncertain_px, even_[static_cast<std::size_t>(band)])) {
+            is_even_[static_cast<std::size_t>(band)] = true;
+            continue;
+        }
+        is_even_[static_cast<std::size_t>(band)] = false;
         const std::size_t first = static_cast<std::size_t>(band) * 2 * table_;
         for (std::size_t i = 0; i < table_; ++i) {
             const int measured_q4 = first_q4_ + static_cast<int>(i);
@@ -189,6 +225,10 @@ void Classifier::classify_row(ConstDisparityMap map, const Wedge& wedge, int v, 
         const double ground = std::clamp(wedge.ground.at(u, v), -kLargestPx, kLargestPx);
         row.ground_q20 = static_cast<std::int32_t>(std::floor(ground * kOne + 0.5));
         row.count = std::min(kernels::kClassColumns, map.width() - u);
+        if (is_even_[static_cast<std::size_t>(band)]) {
+            kernels::classify_columns(row, even_[static_cast<std::size_t>(band)], out.row(v) + u);
+            continue;
+        }
         const std::size_t first = static_cast<std::size_t>(band) * 2 * table_;
         kernels::classify_columns(
             row, {&up_q20_[first], &down_q20_[first], static_cast<std::int32_t>(table_)}, out.row(v) + u);

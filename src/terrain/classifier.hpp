@@ -12,6 +12,7 @@
 #include "core/rectified_rig.hpp"
 #include "core/result.hpp"
 #include "core/terrain_class.hpp"
+#include "terrain/classify_kernels.hpp"
 #include "terrain/components.hpp"
 #include "terrain/config.hpp"
 #include "terrain/ground_surface.hpp"
@@ -54,6 +55,8 @@ class Classifier {
 
     Wedge wedge_of(const Ground& ground) const;
     double certify_columns(const Wedge& wedge);
+    bool even_limits(const Wedge& wedge, GroundUse use, const GroundSurface& surface, int band,
+                     double uncertain_px, kernels::EvenLimits& limits) const;
     void make_limits(const Wedge& wedge, GroundUse use, const GroundSurface& surface);
     void classify_row(ConstDisparityMap map, const Wedge& wedge, int v, Mask out) const;
 
@@ -67,6 +70,8 @@ class Classifier {
     std::span<std::int32_t> certified_q4_;  // per column, the least measured disparity within its range
     std::span<std::int32_t> up_q20_;        // [band][within, beyond][disparity]
     std::span<std::int32_t> down_q20_;
+    std::span<kernels::EvenLimits> even_;  // [band]
+    std::span<bool> is_even_;              // [band]
     Components components_;
     Outline outline_;
     FixedVector<Thing, kMaxObstacles> things_;

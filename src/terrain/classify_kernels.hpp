@@ -31,9 +31,21 @@ struct ClassRow {
     int count;                     // columns, at most kClassColumns
 };
 
+// The same limits where they grow evenly with the disparity, as above a plane whose cells are alike: no
+// table. Products of disparities and factors must fit 32 bits.
+struct EvenLimits {
+    std::int32_t up_q16, down_q16;          // factors of the measured disparity
+    std::int32_t up_off_q20, down_off_q20;  // taken off: the factors times the offset
+    std::int32_t offset_q20;                // measured minus true disparity
+    std::int32_t uncertain_q20;             // beyond its range a pixel must be nearer than the ground by this
+    bool level;                             // level ground is class 1
+};
+
 // Writes row.count classes. Reads and writes up to 15 columns behind them: rows are padded.
 void classify_columns(const ClassRow& row, const ClassLimits& limits, TerrainClass* out);
-// The same, pixel by pixel: what it must equal.
+void classify_columns(const ClassRow& row, const EvenLimits& limits, TerrainClass* out);
+// The same, pixel by pixel: what they must equal.
 void classify_columns_plain(const ClassRow& row, const ClassLimits& limits, TerrainClass* out);
+void classify_columns_plain(const ClassRow& row, const EvenLimits& limits, TerrainClass* out);
 
 }  // namespace groundline::terrain::kernels

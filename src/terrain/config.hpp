@@ -56,7 +56,8 @@ struct TerrainConfig {
     double mount_yaw_deg = 0.0;
     int sectors = 32;  // 1..kMaxSectors; 32 over 80 deg are 2.5 deg each, a person at 15 m
 
-    // What was seen in a sector is held until it was absent in so many of so many frames. 1 <= frames <= window
+    // What was seen in a sector is held until it was absent in so many of so many frames. 1 <= frames <=
+    // window
     // <= 32; frames = 1 holds nothing.
     int clear_frames = 2;
     int clear_window = 3;

@@ -25,6 +25,7 @@ TEST(ClassifyKernel, EqualsItsPlainStatementOnEveryUnit) {
     std::vector<Invalid> invalid(kClassColumns + 16);
     std::vector<std::int32_t> certified(kClassColumns + 16);
     std::vector<int> seen(4, 0);
+    std::vector<int> seen_even(4, 0);
     on_every_vector_unit([&] {
         for (int trial = 0; trial < 300; ++trial) {
             ClassRow row{};
@@ -54,15 +55,31 @@ TEST(ClassifyKernel, EqualsItsPlainStatementOnEveryUnit) {
             std::vector<TerrainClass> fast(kClassColumns + 16);
             classify_columns_plain(row, limits, plain.data());
             classify_columns(row, limits, fast.data());
+            EvenLimits even{};
+            even.up_q16 = static_cast<std::int32_t>(dice.between(-0.5, 0.6) * 65536);
+            even.down_q16 = static_cast<std::int32_t>(dice.between(1.0, 3.0) * 65536);
+            even.offset_q20 =
+                trial % 2 == 0 ? 0 : static_cast<std::int32_t>(dice.between(-3.0, 3.0) * 1048576);
+            even.up_off_q20 = even.offset_q20 / 2;
+            even.down_off_q20 = even.offset_q20 * 2;
+            even.uncertain_q20 = static_cast<std::int32_t>(dice.between(0.0, 2.0) * 1048576);
+            even.level = trial % 5 != 0;
+            std::vector<TerrainClass> plain_even(kClassColumns + 16);
+            std::vector<TerrainClass> fast_even(kClassColumns + 16);
+            classify_columns_plain(row, even, plain_even.data());
+            classify_columns(row, even, fast_even.data());
             for (int u = 0; u < row.count; ++u) {
                 const auto at = static_cast<std::size_t>(u);
+                ASSERT_EQ(fast_even[at], plain_even[at]) << "trial " << trial << " column " << u;
+                ++seen_even[static_cast<std::size_t>(plain_even[at])];
                 ASSERT_EQ(fast[at], plain[at]) << "trial " << trial << " column " << u;
                 ++seen[static_cast<std::size_t>(plain[at])];
             }
         }
     });
-    for (const int count : seen)
-        EXPECT_GT(count, 1000);  // the trials reach every class
+    for (const auto& counts : {seen, seen_even})
+        for (const int count : counts)
+            EXPECT_GT(count, 1000);  // the trials reach every class
 }
 
 // The statement: eight partial sums of floats, each operation rounded by itself.
