@@ -45,7 +45,7 @@ TEST(ClassifyKernel, EqualsItsPlainStatementOnEveryUnit) {
                 invalid[u] = roll == 0   ? Invalid::kRangeEdge
                              : roll == 1 ? static_cast<Invalid>(dice.bits() % 9)
                                          : Invalid::kNone;
-                certified[u] = row.first_q4 + static_cast<int>(dice.bits() % 1000);
+                certified[u] = row.first_q4 + static_cast<int>(dice.bits() % 300);
             }
             row.disparity_q4 = disparity.data();
             row.invalid = invalid.data();
@@ -56,8 +56,8 @@ TEST(ClassifyKernel, EqualsItsPlainStatementOnEveryUnit) {
             classify_columns_plain(row, limits, plain.data());
             classify_columns(row, limits, fast.data());
             EvenLimits even{};
-            even.up_q16 = static_cast<std::int32_t>(dice.between(-0.5, 0.6) * 65536);
-            even.down_q16 = static_cast<std::int32_t>(dice.between(1.0, 3.0) * 65536);
+            even.up_q16 = static_cast<std::int32_t>(dice.between(-0.5, 0.3) * 65536);
+            even.down_q16 = static_cast<std::int32_t>(dice.between(0.3, 2.0) * 65536);
             even.offset_q20 =
                 trial % 2 == 0 ? 0 : static_cast<std::int32_t>(dice.between(-3.0, 3.0) * 1048576);
             even.up_off_q20 = even.offset_q20 / 2;
