@@ -17,8 +17,8 @@ Figure share(std::int64_t part, std::int64_t whole);
 // text; null for none.
 nlohmann::ordered_json number(const Figure& figure);
 
-// One line of text each, the first `left` columns flush left, the others flush right. All of one length; no spaces
-// at an end.
+// One line of text each, the first `left` columns flush left, the others flush right. All of one length; no
+// spaces at an end.
 std::string aligned(const std::vector<std::vector<std::string>>& lines, std::size_t left);
 
 }  // namespace groundline::cli
