@@ -18,6 +18,7 @@ constexpr int kMostSteps = 8;         // height bins from one range to the next
 constexpr double kGapBins = 0.5 * kBinsPerTolerance;
 constexpr double kLipBins = 0.6 * kBinsPerTolerance;
 constexpr double kLipRows = 6.0;
+constexpr double kRampBins = 0.6 * kBinsPerTolerance;
 // The profile is taken where it holds this much more than the plane does.
 constexpr double kWorthwhile = 1.10;
 
@@ -277,6 +278,23 @@ void GroundSurface::find(ConstDisparityMap map, const DisparityPlane& plane, dou
     flat_ = !wavy;
 }
 
+// A step up across the whole view comes out as a ramp of nearly the greatest slope. What rises by most of the
+// tolerance within four times it is as likely such a step: nothing there is called level.
+void GroundSurface::doubt_ramps() {
+    const double reach = 4.0 * kBinsPerTolerance * height_bin_;
+    for (int near = steps_ - 1; near > 0; --near) {
+        int far = near;
+        while (far > 0 &&
+               range_[static_cast<std::size_t>(far - 1)] <= range_[static_cast<std::size_t>(near)] + reach)
+            --far;
+        if (profile_[static_cast<std::size_t>(far)] - profile_[static_cast<std::size_t>(near)] < kRampBins)
+            continue;
+        for (int step = far; step <= near; ++step)
+            for (int band = 0; band < bands_; ++band)
+                support_[cell(step, band)] = CellSupport::kContradicted;
+    }
+}
+
 void GroundSurface::settle(double per_row_px) {
     if (!flat_) cut_behind_lip(per_row_px);
     // Steps are known in their middle; between them the surface is straight.
@@ -292,6 +310,7 @@ void GroundSurface::settle(double per_row_px) {
                                               share * profile_[static_cast<std::size_t>(other)]));
     }
     judge_cells();
+    if (!flat_) doubt_ramps();
 }
 
 }  // namespace groundline::terrain

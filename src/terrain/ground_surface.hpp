@@ -67,6 +67,7 @@ class GroundSurface {
     bool trace_profile(double per_row_px);
     void cut_behind_lip(double per_row_px);
     void judge_cells();
+    void doubt_ramps();
 
     int bands_ = 1;
     int width_ = 0;

@@ -537,6 +537,34 @@ TEST(GroundSurface, StepUpIsAnObstacle) {
                 }
 }
 
+// Lower ones may come out as a ramp, but not as one to drive up: of the face above the tolerance and what
+// noise of 0.25 px makes of it next to nothing is class 1.
+TEST(GroundSurface, ARampThatMayBeAStepIsNotLevel) {
+    const RectifiedRig rig = rig_of();
+    Stage stage(rig);
+    for (const double height : {0.6, 1.0})
+        for (const double step : {3.0, 5.0})
+            for (const double rises_m : {0.25, 0.30, 0.35}) {
+                SCOPED_TRACE(::testing::Message()
+                             << "camera " << height << " m, step of " << rises_m << " m at " << step << " m");
+                const Scene scene({rig, pose_deg(12.0, 0.0, height), {}},
+                                  [=](double x) { return x < step ? 0.0 : rises_m; });
+                scene.render(kMatcher, stage.map);
+                stage.run();
+                int face = 0;
+                int free = 0;
+                for (int v = 0; v < rig.height; ++v)
+                    for (int u = 0; u < rig.width; ++u) {
+                        const Seen& seen = scene.at(u, v);
+                        if (seen.height_m < 0.23 || seen.forward_m > step + 0.01) continue;
+                        ++face;
+                        free += stage.mask.at(u, v) == TerrainClass::kTraversable ? 1 : 0;
+                    }
+                ASSERT_GT(face, 500);
+                EXPECT_LT(free, 0.05 * face);
+            }
+}
+
 // One band is raised by twice the tolerance from a row down to the last: its cells with the raised pixels
 // are contradicted, the farther ones supported, those without a pixel are neither.
 TEST(GroundSurface, CellsAreJudgedByTheirOwnPixels) {
