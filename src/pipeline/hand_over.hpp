@@ -21,7 +21,8 @@ class HandOver {
     HandOver& operator=(const HandOver&) = delete;
     virtual ~HandOver() = default;
 
-    // Producer. The slot to fill, or nullptr after close(): nobody will read any more.
+    // Producer. The slot to fill, or nullptr after close(): nobody will read any more. Without a commit() in
+    // between it is the same slot again.
     virtual T* begin_write() = 0;
     // Producer. Hands over the slot of the last begin_write().
     virtual void commit() = 0;

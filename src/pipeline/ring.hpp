@@ -23,9 +23,15 @@ class Ring final : public HandOver<T> {
             free_.push(index);
     }
 
-    T* begin_write() override { return wait_for(free_, freed_, write_) ? &slots_[write_] : nullptr; }
+    T* begin_write() override {
+        if (closed_.load(std::memory_order_acquire)) return nullptr;
+        if (!writing_ && !wait_for(free_, freed_, write_)) return nullptr;
+        writing_ = true;
+        return &slots_[write_];
+    }
 
     void commit() override {
+        writing_ = false;
         full_.push(write_);
         wake(filled_);
     }
@@ -79,6 +85,7 @@ class Ring final : public HandOver<T> {
     std::atomic<bool> ended_{false};
     std::atomic<bool> closed_{false};
     alignas(64) std::uint32_t write_ = 0;
+    bool writing_ = false;  // write_ is taken and not yet handed over
     alignas(64) std::uint32_t read_ = 0;
 };
 
