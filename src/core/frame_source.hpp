@@ -22,6 +22,7 @@ enum class Pull : std::uint8_t {
     kFrame,  // the frame is filled
     kBad,    // this pair cannot be read; error() says why; its position is in the frame's stamp; go on
     kEnd,    // no more pairs
+    kIdle,   // nothing came within the source's own waiting time; call again. Only live sources give it
 };
 
 // Used by one thread. The constructor of an implementation opens the source and throws Refusal when it
@@ -34,8 +35,10 @@ class FrameSource {
     virtual ~FrameSource() = default;
 
     virtual const SourceInfo& info() const = 0;
-    // Writes the next pair into `frame`, whose images have the size info() says. May block on a device or a
-    // disk. Never throws: what goes wrong is kBad or kEnd with a sentence in error().
+    // Writes the next pair into `frame`, whose images have the size info() says. May block on a disk; a live
+    // source waits at most 100 ms and then returns kIdle, so that whoever calls can see that it shall stop.
+    // Never throws: what goes wrong is kBad or kEnd with a sentence in error(). After kIdle the frame's
+    // pixels and stamp mean nothing.
     virtual Pull next(StereoFrame& frame) = 0;
     // One sentence about the last kBad, or about a kEnd that came from a failure; empty after a clean end.
     virtual const std::string& error() const = 0;

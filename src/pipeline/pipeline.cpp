@@ -100,6 +100,7 @@ void Pipeline::capture(const RunOptions& options, const std::atomic<bool>& stop,
         const std::int64_t begin_ns = now_mono_ns();
         const Pull pull = source_.next(slot->frame);
         slot->read_ns = now_mono_ns() - begin_ns;
+        if (pull == Pull::kIdle) continue;
         if (pull == Pull::kEnd) {
             report.source_error = source_.error();
             if (!report.source_error.empty() || !options.loop || !source_.rewind()) return;

@@ -63,6 +63,37 @@ class ScriptedSource final : public FrameSource {
     std::string error_ = "";
 };
 
+// Says kIdle `pauses` times before each pair of another source; from pair `silent_from` on it says nothing
+// else and turns `stop` true after the tenth time.
+class PausingSource final : public FrameSource {
+  public:
+    PausingSource(std::int64_t length, int pauses, std::int64_t silent_from, std::atomic<bool>& stop)
+        : source_(length), pauses_(pauses), silent_from_(silent_from), stop_(stop) {}
+    const SourceInfo& info() const override { return source_.info(); }
+    Pull next(StereoFrame& frame) override {
+        if (delivered_ == silent_from_) {
+            if (++idle_ == 10) stop_.store(true);
+            if (idle_ > 1000) return Pull::kEnd;  // nobody looked at `stop`
+            return Pull::kIdle;
+        }
+        if (idle_++ < pauses_) return Pull::kIdle;
+        idle_ = 0;
+        ++delivered_;
+        return source_.next(frame);
+    }
+    const std::string& error() const override { return source_.error(); }
+    bool rewind() override { return source_.rewind(); }
+    int idle() const { return idle_; }
+
+  private:
+    ScriptedSource source_;
+    int pauses_;
+    std::int64_t silent_from_;
+    std::atomic<bool>& stop_;
+    std::int64_t delivered_ = 0;
+    int idle_ = 0;
+};
+
 class RecordingSink final : public Sink {
   public:
     bool consume(const FrameResult& result) override {
@@ -209,6 +240,38 @@ TEST(Pipeline, LoopsAndHonoursTheFrameLimit) {
     options.frames = 10;
     run_pipeline(source, sink, options, 1, kNeverStop);
     EXPECT_EQ(sink.positions, (std::vector<std::int64_t>{0, 1, 2, 3, 0, 1, 2, 3, 0, 1}));
+}
+
+// More than there are slots: a slot begun for a bad pair is not lost.
+TEST(Pipeline, GoesOnAfterManyBadPairs) {
+    ScriptedSource source(12, {1, 2, 4, 5, 6, 8, 9, 10});
+    RecordingSink sink;
+    const auto run = run_pipeline(source, sink, {}, 1, kNeverStop);
+    EXPECT_EQ(sink.positions, (std::vector<std::int64_t>{0, 3, 7, 11}));
+    EXPECT_EQ(run->counters.get(Count::kFramesBad), 8U);
+}
+
+TEST(Pipeline, AnIdleSourceIsAskedAgainAndCountsNothing) {
+    std::atomic<bool> stop{false};
+    PausingSource source(100, 3, -1, stop);
+    RecordingSink sink;
+    RunOptions options;
+    options.frames = 5;
+    const auto run = run_pipeline(source, sink, options, 1, stop);
+    EXPECT_EQ(sink.positions, (std::vector<std::int64_t>{0, 1, 2, 3, 4}));
+    EXPECT_EQ(run->counters.get(Count::kFramesRead), 5U);
+    EXPECT_EQ(run->counters.get(Count::kFramesBad), 0U);
+    EXPECT_FALSE(run->report.interrupted);
+}
+
+TEST(Pipeline, StopsWhileItsSourceIsIdle) {
+    std::atomic<bool> stop{false};
+    PausingSource source(100, 0, 2, stop);
+    RecordingSink sink;
+    const auto run = run_pipeline(source, sink, {}, 1, stop);
+    EXPECT_EQ(sink.positions, (std::vector<std::int64_t>{0, 1}));
+    EXPECT_EQ(source.idle(), 10);
+    EXPECT_TRUE(run->report.interrupted);
 }
 
 // On all threads of ours together: capture, processing, workers, sinks.
