@@ -12,13 +12,12 @@
 #include "cli/interrupt.hpp"
 #include "cli/progress.hpp"
 #include "cli/run_report.hpp"
-#include "cli/run_setup.hpp"
 #include "core/clock.hpp"
 #include "core/error.hpp"
-#include "io/calibration/calibration_reader.hpp"
 #include "io/result_writer.hpp"
 #include "pipeline/worker_pool.hpp"
 #include "publish/lcm_publisher.hpp"
+#include "setup/run_setup.hpp"
 
 namespace groundline::cli {
 namespace {
@@ -46,27 +45,6 @@ pipeline::RunOptions run_options(const ReplayOptions& options) {
     return run;
 }
 
-std::optional<rig::StereoCalibration> load_calibration(const ReplayOptions& options,
-                                                       const capture::OpenedSource& opened) {
-    const SourceInfo& info = opened.source->info();
-    if (opened.rig && options.calibration.empty()) return calibration_of(*opened.rig);
-    std::vector<std::filesystem::path> files = options.calibration;
-    if (files.empty() && !opened.folder.empty()) files = io::find_calibration(opened.folder);
-    if (files.empty()) return std::nullopt;
-    return io::read_calibration(files, info.width, info.height, opened.colour_pair);
-}
-
-publish::LcmOptions lcm_options(const settings::Settings& settings, Counters& counters) {
-    publish::LcmOptions options;
-    options.url = settings.publish.url;
-    options.prefix = settings.publish.prefix;
-    options.channels.v_disparity = settings.publish.v_disparity;
-    options.channels.preview = settings.publish.preview;
-    options.channels.grid = settings.grid.on;
-    options.counters = &counters;
-    return options;
-}
-
 // The worst that happened decides; each failure is also said.
 ExitStatus status_of(const pipeline::RunReport& report, const Counters& counters) {
     ExitStatus status = counters.get(Count::kFramesBad) > 0 ? ExitStatus::kInput : ExitStatus::kDone;
@@ -91,13 +69,14 @@ int run_replay(const ReplayOptions& options) {
         throw Refusal(ExitStatus::kUsage,
                       "--loop with --out would write the same files for ever: leave one of them out");
     const pipeline::RunOptions run = run_options(options);
-    settings::Settings settings = load_settings(options.config, options.set);
+    settings::Settings settings = setup::load_settings(options.config, options.set);
     if (options.lcm) settings.publish.url = options.lcm_url;
     capture::OpenedSource opened = capture::open_source(options.source);
     FrameSource& source = *opened.source;
     const SourceInfo& info = source.info();
-    const std::optional<rig::StereoCalibration> calibration = load_calibration(options, opened);
-    choose_disparities(info.width, calibration ? calibration->disparities_hint : 0, settings);
+    const std::optional<rig::StereoCalibration> calibration =
+        setup::load_calibration(options.calibration, opened);
+    setup::choose_disparities(info.width, calibration ? calibration->disparities_hint : 0, settings);
 
     // Everything that can be refused is set up before anything is written or printed.
     Arena arena;
@@ -109,13 +88,14 @@ int run_replay(const ReplayOptions& options) {
     if (options.out) writer.emplace(*options.out, counters);
     const int processors = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
     pipeline::WorkerPool pool(options.threads > 0 ? options.threads : processors);
-    pipeline::Processor processor(processor_config(settings, info, info.colour && writer.has_value(), arena),
-                                  rectifier, pool, arena);
+    pipeline::Processor processor(
+        setup::processor_config(settings, info, info.colour && writer.has_value(), arena), rectifier, pool,
+        arena);
     RunStatistics statistics;
     std::vector<pipeline::SinkSlot> sinks{{&statistics, std::nullopt, true}};
     std::optional<publish::LcmPublisher> publisher;
     if (options.lcm) {
-        publisher.emplace(lcm_options(settings, counters));
+        publisher.emplace(setup::lcm_options(settings, counters));
         sinks.push_back({&*publisher, Stage::kPublish, false});
     }
     if (writer) sinks.push_back({&*writer, Stage::kWrite, true});

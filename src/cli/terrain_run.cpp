@@ -8,7 +8,6 @@
 #include <stdexcept>
 
 #include "capture/open.hpp"
-#include "cli/run_setup.hpp"
 #include "cli/terrain_baseline.hpp"
 #include "cli/truth_labels.hpp"
 #include "core/arena.hpp"
@@ -17,6 +16,7 @@
 #include "io/truth.hpp"
 #include "pipeline/processor.hpp"
 #include "rig/rectifier.hpp"
+#include "setup/run_setup.hpp"
 #include "synth/renderer.hpp"
 #include "synth/texture.hpp"
 
@@ -29,7 +29,7 @@ namespace fs = std::filesystem;
 class Ours {
   public:
     Ours(const settings::Settings& settings, const SourceInfo& source, const rig::Rectifier& rectifier)
-        : config_(processor_config(settings, source, false, arena_)),
+        : config_(setup::processor_config(settings, source, false, arena_)),
           judged_(config_, rectifier, serial_, arena_),
           timed_(config_, rectifier, serial_, arena_),
           result_(judged_.make_result(arena_)),
@@ -178,7 +178,7 @@ class SetJudge {
             io::read_calibration(files, info.width, info.height, opened_.colour_pair);
         rectifier_ = std::make_unique<rig::Rectifier>(calibration, info.width, info.height, arena_);
         settings::Settings chosen = settings;
-        choose_disparities(info.width, calibration.disparities_hint, chosen);
+        setup::choose_disparities(info.width, calibration.disparities_hint, chosen);
         judge_ = std::make_unique<Judge>(chosen, info, *rectifier_);
         frame_ = StereoFrame::make(arena_, info.width, info.height, info.colour);
         seen_ = arena_.image<TerrainClass>(info.width, info.height);
@@ -264,12 +264,13 @@ JudgedUnit judge_rendered(const SuiteFrame& asked, const settings::Settings& set
     const synth::Renderer renderer(synth::scene_by_name(asked.spec));
     const synth::Scene& scene = renderer.scene();
     settings::Settings chosen = settings;
-    choose_disparities(scene.rig.width, 0, chosen);
+    setup::choose_disparities(scene.rig.width, 0, chosen);
     const double tolerance_m = chosen.terrain.tolerance_up_m;
 
     Arena arena;
     Serial serial;
-    const rig::Rectifier rectifier(calibration_of(scene.rig), scene.rig.width, scene.rig.height, arena);
+    const rig::Rectifier rectifier(setup::calibration_of(scene.rig), scene.rig.width, scene.rig.height,
+                                   arena);
     StereoFrame frame = StereoFrame::make(arena, scene.rig.width, scene.rig.height, false);
     frame.stamp.source = StampSource::kStartOfExposure;
     renderer.render(0, serial, frame.left, {}, frame.right);

@@ -16,7 +16,6 @@
 
 #include "cli/figures.hpp"
 #include "cli/interrupt.hpp"
-#include "cli/run_setup.hpp"
 #include "cli/step_progress.hpp"
 #include "cli/terrain_baseline.hpp"
 #include "cli/terrain_run.hpp"
@@ -25,6 +24,7 @@
 #include "core/deterministic_math.hpp"
 #include "core/error.hpp"
 #include "pipeline/worker_pool.hpp"
+#include "setup/run_setup.hpp"
 
 namespace groundline::cli {
 namespace {
@@ -321,7 +321,7 @@ std::vector<JudgedUnit> run_all(std::size_t count, int threads, const std::atomi
 }  // namespace
 
 int run_terrain_table(const TerrainTableOptions& options) {
-    const settings::Settings settings = load_settings(options.config, options.set);
+    const settings::Settings settings = setup::load_settings(options.config, options.set);
     const std::atomic<bool>& stop = stop_on_signals();
     cv::setNumThreads(1);  // OpenCV's semi-global matcher answers differently with several
 

@@ -11,7 +11,7 @@ namespace groundline::lint {
 // each: "room/name.hpp:12: ...". The rules:
 //   - a room includes only itself and rooms before it in
 //     core <- rig, stereo, terrain, synth <- verdict <- pipeline <- io <- capture, publish <- settings <-
-//     cli, daemon;
+//     setup <- cli, daemon;
 //   - core, rig, stereo, terrain, synth and verdict are pure: no OpenCV, LCM, files, threads, console, random
 //     devices or containers without an order, and none of the C library's transcendental functions, whose
 //     last bit differs between machines (core/deterministic_math.hpp has its own);

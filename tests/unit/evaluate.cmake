@@ -10,9 +10,9 @@ groundline_test(evaluate
           ${cli}/compared_matchers.cpp ${cli}/evaluate_command.cpp
           ${cli}/evaluate_options.cpp ${cli}/evaluate_set.cpp ${cli}/evaluation.cpp ${cli}/figures.cpp
           ${cli}/interrupt.cpp
-          ${cli}/matcher_table.cpp ${cli}/perturbation.cpp ${cli}/plane_search.cpp ${cli}/run_setup.cpp
+          ${cli}/matcher_table.cpp ${cli}/perturbation.cpp ${cli}/plane_search.cpp
           ${cli}/step_progress.cpp ${cli}/terrain_baseline.cpp ${cli}/terrain_judge.cpp ${cli}/terrain_run.cpp
           ${cli}/terrain_suite.cpp ${cli}/terrain_table.cpp ${cli}/truth_ground.cpp ${cli}/truth_labels.cpp
           ${cli}/truth_sets.cpp
-  USES settings capture pipeline stereo synth io calibration rig core
+  USES setup settings capture pipeline stereo synth io calibration rig core
   LIBS fmt::fmt CLI11::CLI11 nlohmann_json::nlohmann_json opencv_core opencv_calib3d opencv_imgproc)

@@ -1,9 +1,10 @@
-#include "cli/run_setup.hpp"
+#include "setup/run_setup.hpp"
 
 #include "io/body_mask.hpp"
+#include "io/calibration/calibration_reader.hpp"
 #include "rig/range.hpp"
 
-namespace groundline::cli {
+namespace groundline::setup {
 
 settings::Settings load_settings(const std::filesystem::path& file, const std::vector<std::string>& words) {
     settings::Settings settings;
@@ -30,6 +31,15 @@ rig::StereoCalibration calibration_of(const RectifiedRig& rig) {
     return calibration;
 }
 
+std::optional<rig::StereoCalibration> load_calibration(std::vector<std::filesystem::path> files,
+                                                       const capture::OpenedSource& opened) {
+    const SourceInfo& info = opened.source->info();
+    if (opened.rig && files.empty()) return calibration_of(*opened.rig);
+    if (files.empty() && !opened.folder.empty()) files = io::find_calibration(opened.folder);
+    if (files.empty()) return std::nullopt;
+    return io::read_calibration(files, info.width, info.height, opened.colour_pair);
+}
+
 void choose_disparities(int width, int hint, settings::Settings& settings) {
     if (settings.auto_disparities) settings.matcher.disparities = rig::auto_disparities(width, hint);
 }
@@ -47,4 +57,15 @@ pipeline::ProcessorConfig processor_config(const settings::Settings& settings, c
     return config;
 }
 
-}  // namespace groundline::cli
+publish::LcmOptions lcm_options(const settings::Settings& settings, Counters& counters) {
+    publish::LcmOptions options;
+    options.url = settings.publish.url;
+    options.prefix = settings.publish.prefix;
+    options.channels.v_disparity = settings.publish.v_disparity;
+    options.channels.preview = settings.publish.preview;
+    options.channels.grid = settings.grid.on;
+    options.counters = &counters;
+    return options;
+}
+
+}  // namespace groundline::setup
