@@ -19,6 +19,7 @@ struct Key {
     // Sets the value from its text. Returns false where the text is outside `range`.
     std::function<bool(Settings&, std::string_view)> parse = {};
     std::function<std::string(const Settings&)> print = {};
+    bool reloadable = false;  // may change between two frames of a running daemon; the others need a restart
 };
 
 // The table, in the order of the sample file.

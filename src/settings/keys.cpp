@@ -9,6 +9,7 @@
 #include "core/edit_distance.hpp"
 #include "core/error.hpp"
 #include "core/result.hpp"
+#include "settings/cpu_list.hpp"
 #include "settings/key.hpp"
 #include "settings/settings.hpp"
 
@@ -167,8 +168,64 @@ Key tolerance_key() {
     return key;
 }
 
+Key reloadable(Key key) {
+    key.reloadable = true;
+    return key;
+}
+
+template <typename Member>
+Key cpus(std::string name, std::string help, Member member) {
+    Key key = text(std::move(name), "processors such as 0,2-3; empty: any", std::move(help), member);
+    key.parse = [parse = key.parse](Settings& settings, std::string_view list) {
+        return parse_cpu_list(list).has_value() && parse(settings, list);
+    };
+    return key;
+}
+
 // Written once for const and mutable settings.
 #define GROUNDLINE_MEMBER(path) ([](auto& settings) -> auto& { return settings.path; })
+
+void add_capture_keys(std::vector<Key>& keys) {
+    keys.push_back(choice<CaptureDriver>(
+        "capture.driver", {{"files", CaptureDriver::kFiles}, {"synthetic", CaptureDriver::kSynthetic}},
+        "Daemon: where pairs come from: recordings, or rendered scenes.", GROUNDLINE_MEMBER(capture.driver)));
+    keys.push_back(text("capture.source", "a folder, a video, two pictures with a comma between, or a scene",
+                        "Daemon: what the driver opens, as groundline replay does; a scene is NAME[?seed=N].",
+                        GROUNDLINE_MEMBER(capture.source)));
+    keys.push_back(text("capture.calibration", "a file, or two with a comma between",
+                        "Daemon: calibration of the pair; empty: looked for beside the pictures.",
+                        GROUNDLINE_MEMBER(capture.calibration)));
+    keys.push_back(on_off("capture.loop",
+                          "Daemon: recorded and rendered pairs begin again at their end; off, the program "
+                          "ends with them.",
+                          GROUNDLINE_MEMBER(capture.loop)));
+}
+
+void add_daemon_keys(std::vector<Key>& keys) {
+    keys.push_back(whole("process.threads", 0, 256,
+                         "Daemon: threads that share a frame; 0 is one for each processor.",
+                         GROUNDLINE_MEMBER(process.threads)));
+    keys.push_back(on_off("realtime.scheduling",
+                          "Daemon: run capture, processing and sinks as SCHED_FIFO where that is permitted.",
+                          GROUNDLINE_MEMBER(realtime.on)));
+    keys.push_back(whole("realtime.capture_priority", 1, 49,
+                         "Priority of the capture thread; interrupt threads of the kernel run at 50.",
+                         GROUNDLINE_MEMBER(realtime.capture_priority)));
+    keys.push_back(whole("realtime.process_priority", 1, 49,
+                         "Priority of the processing thread and its workers.",
+                         GROUNDLINE_MEMBER(realtime.process_priority)));
+    keys.push_back(whole("realtime.sinks_priority", 1, 49, "Priority of the thread that publishes.",
+                         GROUNDLINE_MEMBER(realtime.sinks_priority)));
+    keys.push_back(cpus("realtime.capture_cpus", "Where the capture thread may run.",
+                        GROUNDLINE_MEMBER(realtime.capture_cpus)));
+    keys.push_back(cpus("realtime.process_cpus", "Where the processing thread and its workers may run.",
+                        GROUNDLINE_MEMBER(realtime.process_cpus)));
+    keys.push_back(cpus("realtime.sinks_cpus", "Where the thread that publishes may run.",
+                        GROUNDLINE_MEMBER(realtime.sinks_cpus)));
+    keys.push_back(on_off("realtime.lock_memory",
+                          "Daemon: keep memory from being swapped out where that is permitted.",
+                          GROUNDLINE_MEMBER(realtime.lock_memory)));
+}
 
 std::vector<Key> make_keys() {
     using stereo::MatcherKind;
@@ -178,6 +235,8 @@ std::vector<Key> make_keys() {
     using terrain::Band;
     using terrain::LineMode;
     std::vector<Key> keys;
+    add_capture_keys(keys);
+
     keys.push_back(choice<MatcherKind>("stereo.matcher",
                                        {{"census_pyramid", MatcherKind::kCensusPyramid},
                                         {"census", MatcherKind::kCensus},
@@ -247,13 +306,14 @@ std::vector<Key> make_keys() {
               "Paper only: most grey levels that one pixel adds to a cost; the paper's 4 % are 10.",
               GROUNDLINE_MEMBER(matcher.paper.truncation)));
 
-    keys.push_back(tolerance_key());
-    keys.push_back(number("terrain.tolerance_ratio", 0.01, 0.9,
+    keys.push_back(reloadable(tolerance_key()));
+    keys.push_back(
+        reloadable(number("terrain.tolerance_ratio", 0.01, 0.9,
                           "The same as a share of the camera height, used where there is no calibration.",
-                          GROUNDLINE_MEMBER(terrain.tolerance_ratio)));
-    keys.push_back(number("terrain.clearance_m", 0.1, 100.0,
-                          "What hangs wholly above this height is no obstacle.",
-                          GROUNDLINE_MEMBER(terrain.clearance_m)));
+                          GROUNDLINE_MEMBER(terrain.tolerance_ratio))));
+    keys.push_back(reloadable(number("terrain.clearance_m", 0.1, 100.0,
+                                     "What hangs wholly above this height is no obstacle.",
+                                     GROUNDLINE_MEMBER(terrain.clearance_m))));
     keys.push_back(choice<Band>("terrain.band",
                                 {{"off", Band::kOff},
                                  {"50rows", Band::k50Rows},
@@ -265,8 +325,9 @@ std::vector<Key> make_keys() {
         choice<LineMode>("terrain.line", {{"votes", LineMode::kVotes}, {"longest", LineMode::kLongest}},
                          "How the ground line is chosen: most votes, or the paper's longest segment.",
                          GROUNDLINE_MEMBER(terrain.line)));
-    keys.push_back(number("terrain.stopping_distance_m", 0.0, 100.0, "Distance the robot needs to stop.",
-                          GROUNDLINE_MEMBER(terrain.stopping_distance_m)));
+    keys.push_back(
+        reloadable(number("terrain.stopping_distance_m", 0.0, 100.0, "Distance the robot needs to stop.",
+                          GROUNDLINE_MEMBER(terrain.stopping_distance_m))));
     keys.push_back(whole("terrain.sectors", 1, static_cast<int>(kMaxSectors),
                          "Bearing sectors the field of view is cut into.",
                          GROUNDLINE_MEMBER(terrain.sectors)));
@@ -301,10 +362,10 @@ std::vector<Key> make_keys() {
                         GROUNDLINE_MEMBER(publish.url)));
     keys.push_back(text("publish.prefix", "a word", "Channels are PREFIX_MASK, PREFIX_SECTORS and so on.",
                         GROUNDLINE_MEMBER(publish.prefix)));
-    keys.push_back(on_off("publish.v_disparity", "Publish the v-disparity image too.",
-                          GROUNDLINE_MEMBER(publish.v_disparity)));
-    keys.push_back(on_off("publish.preview", "Publish a small picture of the left view too.",
-                          GROUNDLINE_MEMBER(publish.preview)));
+    keys.push_back(reloadable(on_off("publish.v_disparity", "Publish the v-disparity image too.",
+                                     GROUNDLINE_MEMBER(publish.v_disparity))));
+    keys.push_back(reloadable(on_off("publish.preview", "Publish a small picture of the left view too.",
+                                     GROUNDLINE_MEMBER(publish.preview))));
 
     keys.push_back(on_off("grid.publish",
                           "Grade the ground cell by cell (elevation, slope, roughness, step, traversability "
@@ -319,6 +380,8 @@ std::vector<Key> make_keys() {
                           GROUNDLINE_MEMBER(grid.side_m)));
     keys.push_back(number("grid.steep_deg", 2.0, 60.0, "A slope from which on a cell's index is 0.",
                           GROUNDLINE_MEMBER(grid.steep_deg)));
+
+    add_daemon_keys(keys);
     return keys;
 }
 

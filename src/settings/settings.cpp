@@ -104,6 +104,17 @@ verdict::Limits verdict_limits(const Settings& settings) {
     return limits;
 }
 
+Reload reload(const Settings& running, const Settings& wanted) {
+    Reload result{running, {}, {}};
+    for (const Key& key : keys()) {
+        const std::string value = key.print(wanted);
+        if (value == key.print(running)) continue;
+        if (key.reloadable) key.parse(result.settings, value);
+        (key.reloadable ? result.taken : result.need_restart).push_back(key.name);
+    }
+    return result;
+}
+
 std::vector<std::pair<std::string, std::string>> in_force(const Settings& settings) {
     std::vector<std::pair<std::string, std::string>> values;
     values.reserve(keys().size());
@@ -115,7 +126,8 @@ std::vector<std::pair<std::string, std::string>> in_force(const Settings& settin
 std::string sample_file() {
     const Settings defaults;
     std::string text =
-        "# groundline configuration: every key at its default. Remove the # in front of a key to set it.\n";
+        "# groundline configuration: every key at its default. Remove the # in front of a key to set it.\n"
+        "# A running groundlined takes over keys marked (reload) on SIGHUP; the others need a restart.\n";
     std::string section;
     for (const Key& key : keys()) {
         const std::size_t dot = key.name.find('.');
@@ -124,7 +136,8 @@ std::string sample_file() {
             text += "\n";
         }
         const std::string value = key.print(defaults);
-        text += fmt::format("# {} [{}]\n#{}: {}\n", key.help, key.range, key.name, value);
+        text += fmt::format("# {} [{}]{}\n#{}: {}\n", key.help, key.range, key.reloadable ? " (reload)" : "",
+                            key.name, value);
     }
     return text;
 }

@@ -1,6 +1,7 @@
 // Everything that can be configured, and the ways it is set: a file, key=value words, defaults.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -26,6 +27,32 @@ struct MountSettings {
     std::string body_mask;  // polygons or the path of a picture, see io/body_mask.hpp; empty: none
 };
 
+enum class CaptureDriver : std::uint8_t { kFiles, kSynthetic };
+
+// Where the daemon's pairs come from; `groundline replay` names its source on the command line.
+struct CaptureSettings {
+    CaptureDriver driver = CaptureDriver::kFiles;
+    std::string source;       // what the driver opens
+    std::string calibration;  // one file, or two with a comma between; empty: looked for beside the pictures
+    bool loop = true;         // recorded and rendered pairs begin again at their end
+};
+
+// What the daemon asks of the machine.
+struct RealtimeSettings {
+    bool on = true;
+    int sinks_priority = 10;
+    int process_priority = 20;
+    int capture_priority = 30;
+    std::string sinks_cpus;  // lists such as 0,2-3; empty: any
+    std::string process_cpus;
+    std::string capture_cpus;
+    bool lock_memory = true;
+};
+
+struct ProcessSettings {
+    int threads = 0;  // that share a frame; 0: one a processor
+};
+
 struct PublishSettings {
     std::string url;                    // empty: LCM_DEFAULT_URL, else the library's default
     std::string prefix = "GROUNDLINE";  // channels are PREFIX_MASK, PREFIX_SECTORS, ...
@@ -41,6 +68,9 @@ struct Settings {
     terrain::GridConfig grid;
     MountSettings mount;
     PublishSettings publish;
+    CaptureSettings capture;
+    ProcessSettings process;
+    RealtimeSettings realtime;
 };
 
 // Reads a YAML file of keys, nested (`stereo: {matcher: paper}`) or dotted (`stereo.matcher: paper`), over
@@ -55,6 +85,14 @@ void set_word(Settings& settings, std::string_view word);
 // Throws Refusal(kConfig) for half a mount (height without pitch or the other way round).
 terrain::TerrainConfig terrain_config(const Settings& settings);
 verdict::Limits verdict_limits(const Settings& settings);
+
+// What of `wanted` a running daemon can take over, and what it cannot.
+struct Reload {
+    Settings settings;  // `running` with the reloadable keys of `wanted`
+    std::vector<std::string> taken;
+    std::vector<std::string> need_restart;
+};
+Reload reload(const Settings& running, const Settings& wanted);
 
 // Every key with its value in force, in the table's order.
 std::vector<std::pair<std::string, std::string>> in_force(const Settings& settings);

@@ -10,6 +10,7 @@
 
 #include "core/edit_distance.hpp"
 #include "core/error.hpp"
+#include "settings/cpu_list.hpp"
 #include "settings/key.hpp"
 
 namespace groundline::settings {
@@ -144,6 +145,45 @@ TEST(Sample, TheShippedFileIsTheTable) {
     std::stringstream text;
     text << shipped.rdbuf();
     EXPECT_EQ(text.str(), sample_file()) << "write it anew with: groundline config > config/groundline.yaml";
+}
+
+TEST(CpuList, IsReadOrRefused) {
+    EXPECT_EQ(parse_cpu_list(""), std::vector<int>{});
+    EXPECT_EQ(parse_cpu_list("3"), std::vector<int>{3});
+    EXPECT_EQ(parse_cpu_list("0,2-4,1023"), (std::vector<int>{0, 2, 3, 4, 1023}));
+    for (const char* bad : {",", "1,", ",1", "1,,2", "a", "-1", "3-2", "1-", "1024", "0x1", " 1", "1-2-3"})
+        EXPECT_FALSE(parse_cpu_list(bad).has_value()) << bad;
+    Settings settings;
+    refusal([&] { set_word(settings, "realtime.capture_cpus=1-"); }, ExitStatus::kConfig);
+}
+
+TEST(Reload, TakesWhatMayChangeAndNamesWhatMayNot) {
+    Settings running;
+    set_word(running, "terrain.clearance_m=1.5");
+    Settings wanted;
+    for (const char* word : {"terrain.tolerance_m=0.1", "publish.preview=on", "stereo.matcher=census",
+                             "publish.prefix=OTHER", "terrain.clearance_m=1.5"})
+        set_word(wanted, word);
+    const Reload result = reload(running, wanted);
+    EXPECT_EQ(result.taken, (std::vector<std::string>{"terrain.tolerance_m", "publish.preview"}));
+    EXPECT_EQ(result.need_restart, (std::vector<std::string>{"stereo.matcher", "publish.prefix"}));
+    EXPECT_EQ(result.settings.terrain.tolerance_up_m, 0.1);
+    EXPECT_EQ(result.settings.terrain.tolerance_down_m, 0.1);
+    EXPECT_EQ(result.settings.terrain.clearance_m, 1.5);
+    EXPECT_TRUE(result.settings.publish.preview);
+    EXPECT_EQ(result.settings.publish.prefix, "GROUNDLINE");
+    EXPECT_EQ(result.settings.matcher.kind, stereo::MatcherKind::kCensusPyramid);
+}
+
+// A reload goes through the printed form of each value, so that form must hold all of it.
+TEST(Reload, NothingChangedIsNothingToDo) {
+    Settings running;
+    set_word(running, "terrain.tolerance_m=0.123456789012345");
+    const Reload result = reload(running, running);
+    EXPECT_TRUE(result.taken.empty());
+    EXPECT_TRUE(result.need_restart.empty());
+    const Reload taken = reload(Settings{}, running);
+    EXPECT_EQ(taken.settings.terrain.tolerance_up_m, 0.123456789012345);
 }
 
 TEST(Mount, HalfAMountIsRefusedAndAWholeOneNarrowsTheGate) {
