@@ -120,7 +120,8 @@ struct GroundEvidence {
 struct Evidence {
     bool calibrated = false;
     bool mount_prior = false;
-    bool checked = true;  // disparities passed validity checks; if not, every pixel counts as valid
+    bool overloaded = false;  // the pair's mode is not kFull
+    bool checked = true;      // disparities passed validity checks; if not, every pixel counts as valid
     PhotometricEvidence photometric;
     PairEvidence pair;
     GroundEvidence ground_fit;

@@ -39,12 +39,20 @@ struct FrameStamp {
     std::string_view name_view() const { return {name.data()}; }
 };
 
+// What was given up for this pair because the machine could not keep up. Decided while running live, recorded
+// with the pair, and from then on an input like its pixels.
+enum class FrameMode : std::uint8_t {
+    kFull = 0,
+    kSkipping = 1,  // pairs before it were skipped, again and again
+};
+
 // Memory for one pair, allocated once; sources write into it. Images are as delivered, not yet rectified.
 struct StereoFrame {
     FrameStamp stamp;
     Luma left;
     Luma right;
-    BgrView left_bgr;        // empty where the source has no colour
+    BgrView left_bgr;  // empty where the source has no colour
+    FrameMode mode = FrameMode::kFull;
     AttitudeInput attitude;  // a source that ever sets it sets it for every pair
 
     static StereoFrame make(Arena& arena, int width, int height, bool colour) {

@@ -1,8 +1,6 @@
 // How one thread hands frames to the next: the interface of the two hand-overs.
 #pragma once
 
-#include <cstdint>
-
 namespace groundline::pipeline {
 
 // One producer thread, one consumer thread, a fixed set of slots that never move. A slot belongs to exactly
@@ -24,8 +22,9 @@ class HandOver {
     // Producer. The slot to fill, or nullptr after close(): nobody will read any more. Without a commit() in
     // between it is the same slot again.
     virtual T* begin_write() = 0;
-    // Producer. Hands over the slot of the last begin_write().
-    virtual void commit() = 0;
+    // Producer. Hands over the slot of the last begin_write(). True where that cost a committed slot that no
+    // one had taken: it is lost, and whoever counts losses counts it now.
+    virtual bool commit() = 0;
     // Producer. No more will come; the consumer still gets what was committed.
     virtual void end_of_stream() = 0;
     // Consumer. Waits for the next slot; nullptr after the end of the stream or after close().
@@ -34,8 +33,6 @@ class HandOver {
     virtual void release() = 0;
     // Any thread. Both sides stop waiting and get nullptr from now on.
     virtual void close() = 0;
-    // Any thread. Committed slots that no one ever took because a newer one came.
-    virtual std::uint64_t overwritten() const = 0;
 };
 
 }  // namespace groundline::pipeline

@@ -9,6 +9,7 @@
 #include "pipeline/pacer.hpp"
 #include "pipeline/ring.hpp"
 #include "pipeline/triple_buffer.hpp"
+#include "verdict/overload.hpp"
 
 namespace groundline::pipeline {
 namespace {
@@ -34,6 +35,12 @@ void sleep_until(std::int64_t due_mono_ns, const std::atomic<bool>& stop) {
                              static_cast<long>(wake % 1'000'000'000)};
         clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr);
     }
+}
+
+void stamp_as_taken(std::int64_t mono_ns, FrameStamp& stamp) {
+    stamp.exposure_mono_ns = mono_ns;
+    stamp.utime_us = now_utime_us() - (now_mono_ns() - mono_ns) / 1000;
+    stamp.source = StampSource::kArrival;
 }
 
 void name_this_thread(const char* name) {
@@ -70,20 +77,26 @@ void Pipeline::run(const RunOptions& options, const std::atomic<bool>& stop, Bad
     const CloseBoth close_both{*this};
     sinks = std::jthread([&] {
         name_this_thread("gl-sinks");
+        if (options.on_thread) options.on_thread(ThreadRole::kSinks);
         deliver(report);
     });
     processing = std::jthread([&] {
         name_this_thread("gl-process");
+        if (options.on_thread) options.on_thread(ThreadRole::kProcessing);
         process(report);
     });
     name_this_thread("gl-capture");
+    if (options.on_thread) options.on_thread(ThreadRole::kCapture);
     capture(options, stop, on_bad, report);
     name_this_thread("groundline");
     captured_->end_of_stream();
     processing.join();
     sinks.join();
-    counters_.add(Count::kFramesOverwritten, captured_->overwritten());
-    counters_.add(Count::kResultsOverwritten, finished_->overwritten());
+}
+
+void Pipeline::tune(const Tuning& tuning) {
+    *tuning_.begin_write() = tuning;
+    tuning_.commit();
 }
 
 void Pipeline::capture(const RunOptions& options, const std::atomic<bool>& stop, BadPair on_bad,
@@ -95,8 +108,10 @@ void Pipeline::capture(const RunOptions& options, const std::atomic<bool>& stop,
             report.interrupted = true;
             return;
         }
+        capture_turns_.fetch_add(1, std::memory_order_relaxed);
         CaptureSlot* slot = captured_->begin_write();
         if (slot == nullptr) return;
+        slot->frame.mode = FrameMode::kFull;
         const std::int64_t begin_ns = now_mono_ns();
         const Pull pull = source_.next(slot->frame);
         slot->read_ns = now_mono_ns() - begin_ns;
@@ -112,16 +127,27 @@ void Pipeline::capture(const RunOptions& options, const std::atomic<bool>& stop,
             on_bad(slot->frame.stamp, source_.error());
             continue;
         }
-        if (options.pace != Pace::kMax)
-            sleep_until(pacer.due_ns(slot->frame.stamp.exposure_mono_ns, now_mono_ns()), stop);
+        if (options.pace != Pace::kMax) {
+            const std::int64_t due_ns = pacer.due_ns(slot->frame.stamp.exposure_mono_ns, now_mono_ns());
+            sleep_until(due_ns, stop);
+            if (options.stamp_when_due) stamp_as_taken(due_ns, slot->frame.stamp);
+        }
         slot->arrival_mono_ns = now_mono_ns();
         counters_.add(Count::kFramesRead);
-        captured_->commit();
+        if (captured_->commit()) counters_.add(Count::kFramesOverwritten);
     }
 }
 
 void Pipeline::process(RunReport& report) {
+    const verdict::OverloadLimits limits;
+    verdict::OverloadState overload;
+    std::uint64_t lost_before = 0;
     while (CaptureSlot* captured = captured_->take()) {
+        if (const Tuning* tuning = tuning_.newest()) processor_.tune(*tuning);
+        const std::uint64_t lost = counters_.get(Count::kFramesOverwritten);
+        overload = verdict::next_overload(overload, lost - lost_before, captured->arrival_mono_ns, limits);
+        lost_before = lost;
+        if (overload.overloaded) captured->frame.mode = FrameMode::kSkipping;
         ResultSlot* finished = finished_->begin_write();
         if (finished == nullptr) break;
         processor_.process(captured->frame, finished->result);
@@ -133,7 +159,7 @@ void Pipeline::process(RunReport& report) {
             report.stages[static_cast<std::size_t>(stage)].add(times[static_cast<std::size_t>(stage)]);
         counters_.add(Count::kFramesProcessed);
         captured_->release();
-        finished_->commit();
+        if (finished_->commit()) counters_.add(Count::kResultsOverwritten);
     }
     finished_->end_of_stream();
 }

@@ -4,6 +4,7 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -17,6 +18,7 @@
 #include "core/sink.hpp"
 #include "pipeline/hand_over.hpp"
 #include "pipeline/processor.hpp"
+#include "pipeline/triple_buffer.hpp"
 
 namespace groundline::pipeline {
 
@@ -26,11 +28,18 @@ enum class Pace : std::uint8_t {
     kFixed,   // rate_hz, newest first
 };
 
+enum class ThreadRole : std::uint8_t { kCapture, kProcessing, kSinks };
+
 struct RunOptions {
     Pace pace = Pace::kMax;
     double rate_hz = 0.0;      // for kFixed
     std::int64_t frames = -1;  // pairs to read, -1 all
     bool loop = false;         // start again at the end of the source
+    // As if cameras took the pairs now: each is stamped with the instant it was due, on the clocks of this
+    // computer. For paced runs.
+    bool stamp_when_due = false;
+    // Called once on each thread before its first frame; empty: nothing.
+    std::function<void(ThreadRole)> on_thread = {};
 };
 
 // A required sink's failure ends the run (results on disk); another's is only counted (the network).
@@ -64,6 +73,11 @@ class Pipeline {
     // Called once, from the thread that set everything up. `on_bad` must be safe to call from another thread.
     void run(const RunOptions& options, const std::atomic<bool>& stop, BadPair on_bad, RunReport& report);
 
+    // Any one thread, also while run() runs. Takes effect whole, before the next frame that is processed.
+    void tune(const Tuning& tuning);
+    // Any thread. Rounds of the capture loop so far: it goes on turning when no pair comes.
+    std::uint64_t capture_turns() const { return capture_turns_.load(std::memory_order_relaxed); }
+
   private:
     struct CaptureSlot {
         StereoFrame frame;
@@ -85,6 +99,8 @@ class Pipeline {
     Counters& counters_;
     std::unique_ptr<HandOver<CaptureSlot>> captured_;
     std::unique_ptr<HandOver<ResultSlot>> finished_;
+    TripleBuffer<Tuning> tuning_{{}};
+    std::atomic<std::uint64_t> capture_turns_{0};
 };
 
 }  // namespace groundline::pipeline

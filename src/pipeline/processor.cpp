@@ -78,8 +78,6 @@ FrameResult Processor::make_result(Arena& arena) const {
     const RectifiedRig& rig = rectifier_.rig();
     FrameResult result;
     result.rig = rig;
-    result.tolerance_m = rig.calibrated ? config_.terrain.tolerance_up_m : 0.0;
-    result.tolerance_ratio = rig.calibrated ? 0.0 : config_.terrain.tolerance_ratio;
     result.left = arena.image<std::uint8_t>(rig.width, rig.height);
     if (config_.colour) result.left_bgr = arena.bgr_image(rig.width, rig.height);
     result.disparity = DisparityMap::make(arena, rig.width, rig.height);
@@ -90,10 +88,21 @@ FrameResult Processor::make_result(Arena& arena) const {
     return result;
 }
 
+void Processor::tune(const Tuning& tuning) {
+    config_.limits = tuning.limits;
+    config_.terrain.tune(tuning.terrain);
+    ground_finder_.tune(tuning.terrain);
+    classifier_.tune(tuning.terrain);
+    sector_finder_.tune(tuning.terrain);
+    if (elevation_grid_) elevation_grid_->tune(tuning.terrain);
+}
+
 void Processor::process(const StereoFrame& frame, FrameResult& result) {
     StageClock clock(result.times_ns);
     const RectifiedRig& rig = rectifier_.rig();
     result.stamp = frame.stamp;
+    result.tolerance_m = rig.calibrated ? config_.terrain.tolerance_up_m : 0.0;
+    result.tolerance_ratio = rig.calibrated ? 0.0 : config_.terrain.tolerance_ratio;
 
     rectifier_.rectify(frame, result.left, right_, result.left_bgr, parallel_);
     Evidence& evidence = result.evidence;
@@ -101,6 +110,7 @@ void Processor::process(const StereoFrame& frame, FrameResult& result) {
     evidence.calibrated = rig.calibrated;
     evidence.checked = config_.matcher.checks;
     evidence.mount_prior = config_.terrain.mount_known;
+    evidence.overloaded = frame.mode != FrameMode::kFull;
     evidence.skew_ns = frame.stamp.skew_ns;
     evidence.attitude = frame.attitude;
     evidence.photometric = rig::measure_photometric(result.left, right_, parallel_);

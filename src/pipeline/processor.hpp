@@ -34,6 +34,12 @@ struct ProcessorConfig {
     ConstImageView<std::uint8_t> body;
 };
 
+// What may change between two frames: no memory depends on it.
+struct Tuning {
+    terrain::TerrainConfig terrain;  // of which TerrainConfig::tune() takes its part
+    verdict::Limits limits;
+};
+
 // Holds the state of one camera pair. Used by one thread, which lends it the lanes of `parallel`. The result
 // is a function of the pairs given so far with their stamps and the configuration: of nothing else.
 class Processor {
@@ -48,6 +54,9 @@ class Processor {
 
     // Writes all of `result`, its stage times included. No allocation, no exception.
     void process(const StereoFrame& frame, FrameResult& result);
+
+    // From the next frame on. Same thread as process(); no allocation, no exception.
+    void tune(const Tuning& tuning);
 
     const stereo::Matcher& matcher() const { return *matcher_; }
 

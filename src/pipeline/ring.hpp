@@ -30,10 +30,11 @@ class Ring final : public HandOver<T> {
         return &slots_[write_];
     }
 
-    void commit() override {
+    bool commit() override {
         writing_ = false;
         full_.push(write_);
         wake(filled_);
+        return false;
     }
 
     void end_of_stream() override {
@@ -53,8 +54,6 @@ class Ring final : public HandOver<T> {
         wake(filled_);
         wake(freed_);
     }
-
-    std::uint64_t overwritten() const override { return 0; }
 
   private:
     using Queue = boost::lockfree::spsc_queue<std::uint32_t, boost::lockfree::capacity<kSlots>>;

@@ -17,7 +17,7 @@ namespace groundline::pipeline {
 // commit() swaps write_ with the middle and marks it fresh; take() swaps read_ with the middle if it is
 // fresh. {write_, middle, read_} is always a permutation of {0, 1, 2}, for each swap is one atomic exchange
 // of the middle index. Both swaps are wait-free: a single exchange, no loop. A commit that finds the middle
-// still fresh has overwritten a slot nobody took: counted.
+// still fresh has overwritten a slot nobody took, and says so.
 //
 // take() reads the ticket `changes_` before it looks; a commit after that look changes the ticket, so the
 // wait cannot sleep over it.
@@ -31,11 +31,11 @@ class TripleBuffer final : public HandOver<T> {
 
     T* begin_write() override { return closed_.load(std::memory_order_relaxed) ? nullptr : &slots_[write_]; }
 
-    void commit() override {
+    bool commit() override {
         const std::uint32_t before = state_.exchange(write_ | kFresh, std::memory_order_acq_rel);
         write_ = before & kIndex;
-        if ((before & kFresh) != 0) overwritten_.fetch_add(1, std::memory_order_relaxed);
         wake();
+        return (before & kFresh) != 0;
     }
 
     void end_of_stream() override {
@@ -43,15 +43,19 @@ class TripleBuffer final : public HandOver<T> {
         wake();
     }
 
+    // Consumer. take() without waiting: nullptr where nothing came since the last one.
+    T* newest() {
+        if ((state_.load(std::memory_order_relaxed) & kFresh) == 0) return nullptr;
+        read_ = state_.exchange(read_, std::memory_order_acq_rel) & kIndex;
+        return &slots_[read_];
+    }
+
     T* take() override {
         for (;;) {
             const std::uint32_t ticket = changes_.load(std::memory_order_acquire);
             const bool ended = ended_.load(std::memory_order_acquire);
             if (closed_.load(std::memory_order_acquire)) return nullptr;
-            if ((state_.load(std::memory_order_relaxed) & kFresh) != 0) {
-                read_ = state_.exchange(read_, std::memory_order_acq_rel) & kIndex;
-                return &slots_[read_];
-            }
+            if (T* slot = newest()) return slot;
             if (ended) return nullptr;
             changes_.wait(ticket, std::memory_order_acquire);
         }
@@ -64,8 +68,6 @@ class TripleBuffer final : public HandOver<T> {
         closed_.store(true, std::memory_order_release);
         wake();
     }
-
-    std::uint64_t overwritten() const override { return overwritten_.load(std::memory_order_relaxed); }
 
   private:
     static constexpr std::uint32_t kIndex = 3;
@@ -81,7 +83,6 @@ class TripleBuffer final : public HandOver<T> {
     alignas(64) std::atomic<std::uint32_t> changes_{0};
     std::atomic<bool> ended_{false};
     std::atomic<bool> closed_{false};
-    std::atomic<std::uint64_t> overwritten_{0};
     alignas(64) std::uint32_t write_ = 0;
     alignas(64) std::uint32_t read_ = 2;
 };

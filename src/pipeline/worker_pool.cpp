@@ -7,11 +7,14 @@
 
 namespace groundline::pipeline {
 
-WorkerPool::WorkerPool(int lanes) {
+WorkerPool::WorkerPool(int lanes, const std::function<void()>& on_start) {
     threads_.reserve(static_cast<std::size_t>(lanes > 1 ? lanes - 1 : 0));
     try {
         for (int lane = 1; lane < lanes; ++lane) {
-            threads_.emplace_back([this, lane] { work(lane); });
+            threads_.emplace_back([this, lane, on_start] {
+                if (on_start) on_start();
+                work(lane);
+            });
             pthread_setname_np(threads_.back().native_handle(), ("gl-worker" + std::to_string(lane)).c_str());
         }
     } catch (const std::system_error& fault) {

@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <thread>
 #include <vector>
 
@@ -15,7 +16,8 @@ namespace groundline::pipeline {
 class WorkerPool final : public Parallel {
   public:
     // `lanes` at least 1. Throws std::system_error where the system gives no thread.
-    explicit WorkerPool(int lanes);
+    // `on_start`, where given, is called once on each thread of the pool.
+    explicit WorkerPool(int lanes, const std::function<void()>& on_start = {});
     ~WorkerPool() override;
 
     int lanes() const override { return static_cast<int>(threads_.size()) + 1; }

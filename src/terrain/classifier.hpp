@@ -50,6 +50,9 @@ class Classifier {
                   Mask out, FixedVector<Obstacle, kMaxObstacles>& obstacles, double& range_limit_m,
                   Parallel& parallel);
 
+    // From the next frame on; see TerrainConfig::tune().
+    void tune(const TerrainConfig& config) { config_.tune(config); }
+
   private:
     struct Wedge;
 

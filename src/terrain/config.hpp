@@ -76,6 +76,16 @@ struct TerrainConfig {
     int blur_px = 4;
     // Fewest pixels of a thing at any range; chance clusters of 5 % outliers stay below 8.
     int min_pixels = 12;
+
+    // Takes over what may change between two frames: tolerances, clearance and stopping distance. No memory
+    // and no map depends on them.
+    constexpr void tune(const TerrainConfig& to) {
+        tolerance_up_m = to.tolerance_up_m;
+        tolerance_down_m = to.tolerance_down_m;
+        tolerance_ratio = to.tolerance_ratio;
+        clearance_m = to.clearance_m;
+        stopping_distance_m = to.stopping_distance_m;
+    }
 };
 
 }  // namespace groundline::terrain

@@ -76,6 +76,12 @@ class ElevationGrid {
     // three is measured. Index: IndexRules where all three are measured; 0 for obstacles and drops.
     void find(ConstDisparityMap map, const Ground& ground, ConstMask mask, TerrainGrid& grid);
 
+    // From the next frame on; see TerrainConfig::tune().
+    void tune(const TerrainConfig& config) {
+        terrain_.tune(config);
+        rules_ = IndexRules::of(config_, terrain_);
+    }
+
   private:
     // What fell into a cell; integers, so that no order matters. Ground's x and y are from the cell's corner
     // in 1/256 of a cell, heights in 0.1 mm.

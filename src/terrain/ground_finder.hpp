@@ -42,6 +42,9 @@ class GroundFinder {
     // The last frame's ground about that plane; flat and supported nowhere where none was found.
     const GroundSurface& surface() const { return surface_; }
 
+    // From the next frame on; see TerrainConfig::tune().
+    void tune(const TerrainConfig& config) { config_.tune(config); }
+
   private:
     struct RowTally {
         std::int32_t below = 0;     // sampled pixels below the horizon

@@ -47,6 +47,9 @@ class SectorFinder {
     void find(ConstDisparityMap map, const Ground& ground, ConstMask mask, double range_limit_m,
               FixedVector<Sector, kMaxSectors>& sectors);
 
+    // From the next frame on; see TerrainConfig::tune().
+    void tune(const TerrainConfig& config) { config_.tune(config); }
+
   private:
     // Samples of a thing by disparity, 32 bins an octave.
     struct Depth {

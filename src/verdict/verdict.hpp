@@ -99,11 +99,11 @@ struct Decision {
 // none where the attitude input changed by as much since then, within max_attitude_gap_deg: compared are
 // changes, not angles, because the ground slopes and gravity does not. A stamp before the remembered one
 // means that the source began again: the memory does not count. Worse evidence never gives a better verdict
-// or use. kOverload is never given: Evidence does not hold it.
+// or use.
 Decision decide(const Evidence& evidence, const State& state, std::int64_t now_mono_ns, const Limits& limits);
 
-// The state after that decision. Remembered is a ground whose only reasons are kNoMountPrior, kUncalibrated
-// and kUnchecked: those are about the set-up, not about this frame.
+// The state after that decision. Remembered is a ground whose only reasons are kNoMountPrior, kUncalibrated,
+// kUnchecked and kOverload: those are not about what this frame shows.
 State next_state(const Decision& decision, const State& state, std::int64_t now_mono_ns,
                  const Limits& limits);
 
