@@ -1,0 +1,1 @@
+groundline_test(verdict_camera SOURCES unit/verdict_camera_policy_test.cpp unit/verdict_camera_exposure_test.cpp USES verdict core)
