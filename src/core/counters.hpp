@@ -18,11 +18,12 @@ enum class Count : std::uint8_t {
     kSinkFailures,
     kDisparityClamped,  // values outside what a disparity file can hold
     kPublishFailures,
+    kHealthOverwritten,  // health reports dropped before they were sent: a newer one came
     kCount,
 };
 inline constexpr std::array<std::string_view, static_cast<std::size_t>(Count::kCount)> kCountNames = {
     "frames_read",       "frames_bad",    "frames_overwritten", "frames_processed", "results_overwritten",
-    "results_delivered", "sink_failures", "disparity_clamped",  "publish_failures"};
+    "results_delivered", "sink_failures", "disparity_clamped",  "publish_failures", "health_overwritten"};
 
 // Raised from any thread, wait-free; a reader sees each counter on its own, not a common instant.
 class Counters {

@@ -28,29 +28,41 @@ HealthTracker::HealthTracker(const Counters* counters, std::int64_t stale_after_
     : counters_(counters), stale_after_ns_(stale_after_ns) {}
 
 void HealthTracker::note(const FrameResult& result, std::int64_t publish_ns, std::int64_t now_mono_ns) {
-    ++published_;
-    last_mono_ns_ = now_mono_ns;
-    last_.exposure_mono_ns = result.stamp.exposure_mono_ns;
-    last_.stamp_source = result.stamp.source;
-    last_.sequence = result.stamp.sequence;
-    last_.verdict = result.verdict;
-    last_.reasons = result.reasons;
-    last_.pair_skew_ms = static_cast<double>(result.stamp.skew_ns) / kNsPerMs;
-    last_.brightness_gain = result.evidence.photometric.gain;
-    last_.brightness_offset = result.evidence.photometric.offset;
     for (std::size_t stage = 0; stage < stages_.size(); ++stage)
         if (result.times_ns[stage] > 0) stages_[stage].add(result.times_ns[stage]);
     stages_[static_cast<std::size_t>(Stage::kPublish)].add(publish_ns);
     if (is_of_this_clock(result.stamp.source))
         exposure_to_publish_.add(now_mono_ns - result.stamp.exposure_mono_ns);
+
+    Note& note = *notes_.begin_write();
+    note.published = ++published_;
+    note.mono_ns = now_mono_ns;
+    const PairEvidence& pair = result.evidence.pair;
+    note.epipolar_offset_px = pair.row_features > 0 ? pair.row_offset_px : kNotMeasured;
+    HealthReport& report = note.report;
+    report.exposure_mono_ns = result.stamp.exposure_mono_ns;
+    report.stamp_source = result.stamp.source;
+    report.sequence = result.stamp.sequence;
+    report.verdict = result.verdict;
+    report.reasons = result.reasons;
+    report.pair_skew_ms = static_cast<double>(result.stamp.skew_ns) / kNsPerMs;
+    report.brightness_gain = result.evidence.photometric.gain;
+    report.brightness_offset = result.evidence.photometric.offset;
+    notes_.commit();
 }
 
-bool HealthTracker::silent(std::int64_t now_mono_ns) const {
-    return published_ == 0 || now_mono_ns - last_mono_ns_ > stale_after_ns_;
+const HealthTracker::Note& HealthTracker::newest_note() {
+    if (const Note* note = notes_.newest()) last_ = *note;
+    return last_;
 }
 
-HealthTracker::Totals HealthTracker::totals(std::int64_t now_mono_ns) const {
-    Totals now{now_mono_ns, 0, 0, published_};
+bool HealthTracker::silent(std::int64_t now_mono_ns) {
+    const Note& last = newest_note();
+    return last.published == 0 || now_mono_ns - last.mono_ns > stale_after_ns_;
+}
+
+HealthTracker::Totals HealthTracker::totals(std::int64_t now_mono_ns, std::uint64_t published) const {
+    Totals now{now_mono_ns, 0, 0, published};
     if (counters_ != nullptr) {
         now.read = counters_->get(Count::kFramesRead);
         now.processed = counters_->get(Count::kFramesProcessed);
@@ -58,15 +70,15 @@ HealthTracker::Totals HealthTracker::totals(std::int64_t now_mono_ns) const {
     return now;
 }
 
-void HealthTracker::update_rates(std::int64_t now_mono_ns) {
-    const Totals now = totals(now_mono_ns);
+void HealthTracker::update_rates(std::int64_t now_mono_ns, std::uint64_t published) {
+    const Totals now = totals(now_mono_ns, published);
     const std::int64_t elapsed_ns = now_mono_ns - window_.mono_ns;
     if (window_open_ && elapsed_ns < kRateWindowNs) return;
     if (window_open_) {
-        last_.publish_rate_hz = rate_hz(window_.published, now.published, elapsed_ns);
+        publish_rate_hz_ = rate_hz(window_.published, now.published, elapsed_ns);
         if (counters_ != nullptr) {
-            last_.source_rate_hz = rate_hz(window_.read, now.read, elapsed_ns);
-            last_.process_rate_hz = rate_hz(window_.processed, now.processed, elapsed_ns);
+            source_rate_hz_ = rate_hz(window_.read, now.read, elapsed_ns);
+            process_rate_hz_ = rate_hz(window_.processed, now.processed, elapsed_ns);
         }
     }
     window_ = now;
@@ -74,15 +86,20 @@ void HealthTracker::update_rates(std::int64_t now_mono_ns) {
 }
 
 HealthReport HealthTracker::report(std::int64_t now_utime_us, std::int64_t now_mono_ns) {
-    update_rates(now_mono_ns);
-    HealthReport report = last_;
-    report.utime_us = now_utime_us;
     const bool no_pairs = silent(now_mono_ns);
-    report.state = stopping_         ? LifeState::kStopping
-                   : published_ == 0 ? LifeState::kStarting
-                   : no_pairs        ? LifeState::kStalled
-                                     : LifeState::kRunning;
-    if (published_ > 0) report.result_age_s = static_cast<double>(now_mono_ns - last_mono_ns_) / 1e9;
+    update_rates(now_mono_ns, last_.published);
+    HealthReport report = last_.report;
+    report.utime_us = now_utime_us;
+    report.host = host_;
+    if (last_.published > 0) report.host.epipolar_offset_px = last_.epipolar_offset_px;
+    report.source_rate_hz = source_rate_hz_;
+    report.process_rate_hz = process_rate_hz_;
+    report.publish_rate_hz = publish_rate_hz_;
+    report.state = stopping_              ? LifeState::kStopping
+                   : last_.published == 0 ? LifeState::kStarting
+                   : no_pairs             ? LifeState::kStalled
+                                          : LifeState::kRunning;
+    if (last_.published > 0) report.result_age_s = static_cast<double>(now_mono_ns - last_.mono_ns) / 1e9;
     if (no_pairs) {
         report.verdict = Verdict::kBlind;
         report.reasons = Reasons();

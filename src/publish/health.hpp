@@ -10,6 +10,7 @@
 #include "core/frame.hpp"
 #include "core/latency_histogram.hpp"
 #include "core/result.hpp"
+#include "pipeline/triple_buffer.hpp"
 
 namespace groundline::publish {
 
@@ -67,7 +68,8 @@ struct HealthReport {
     HealthReport() { counts.fill(-1); }
 };
 
-// Keeps what passes by until a report is asked for. Used by one thread; no allocation; reads no clock itself.
+// Keeps what passes by until a report is asked for. One thread notes results, one asks for reports (it may be
+// the same); neither waits for the other. No allocation; reads no clock itself.
 class HealthTracker {
   public:
     // `counters`, which may be null, is borrowed.
@@ -75,34 +77,50 @@ class HealthTracker {
 
     // A result was published; it took `publish_ns`. Stages with time 0 were not timed.
     void note(const FrameResult& result, std::int64_t publish_ns, std::int64_t now_mono_ns);
-    void add(const HostHealth& host) { last_.host = host; }
+
+    // All else is for the thread that asks for reports.
+    void add(const HostHealth& host) { host_ = host; }
     void stop() { stopping_ = true; }
 
     // No result yet, or none for longer than stale_after_ns.
-    bool silent(std::int64_t now_mono_ns) const;
+    bool silent(std::int64_t now_mono_ns);
     // Rates are over the last full second between two reports; not measured before.
     HealthReport report(std::int64_t now_utime_us, std::int64_t now_mono_ns);
 
   private:
+    // Of one result.
+    struct Note {
+        std::uint64_t published = 0;  // this one included
+        std::int64_t mono_ns = 0;
+        double epipolar_offset_px = kNotMeasured;
+        HealthReport report;
+    };
+    const Note& newest_note();
+
     struct Totals {
         std::int64_t mono_ns = 0;
         std::uint64_t read = 0;
         std::uint64_t processed = 0;
         std::uint64_t published = 0;
     };
-    Totals totals(std::int64_t now_mono_ns) const;
-    void update_rates(std::int64_t now_mono_ns);
+    Totals totals(std::int64_t now_mono_ns, std::uint64_t published) const;
+    void update_rates(std::int64_t now_mono_ns, std::uint64_t published);
 
     const Counters* counters_;
     std::int64_t stale_after_ns_;
-    bool stopping_ = false;
-    std::uint64_t published_ = 0;
-    std::int64_t last_mono_ns_ = 0;
-    HealthReport last_;  // of the newest result
+    std::uint64_t published_ = 0;  // of the noting thread
+    pipeline::TripleBuffer<Note> notes_{{}};
     std::array<LatencyHistogram, static_cast<std::size_t>(Stage::kCount)> stages_;
     LatencyHistogram exposure_to_publish_;
+    // Of the reporting thread.
+    Note last_;
+    HostHealth host_;
+    bool stopping_ = false;
     bool window_open_ = false;
     Totals window_;  // where the running second began
+    double source_rate_hz_ = kNotMeasured;
+    double process_rate_hz_ = kNotMeasured;
+    double publish_rate_hz_ = kNotMeasured;
 };
 
 }  // namespace groundline::publish

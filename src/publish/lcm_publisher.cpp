@@ -1,6 +1,7 @@
 #include "publish/lcm_publisher.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <string_view>
 
 #include "core/clock.hpp"
@@ -12,6 +13,8 @@ namespace groundline::publish {
 namespace {
 
 constexpr std::string_view kLongestSuffix = "_VDISPARITY";
+
+}  // namespace
 
 std::string checked_prefix(const std::string& prefix) {
     const bool plain = std::ranges::all_of(prefix, [](char c) {
@@ -26,8 +29,6 @@ std::string checked_prefix(const std::string& prefix) {
     return prefix;
 }
 
-}  // namespace
-
 struct LcmPublisher::Parts {
     explicit Parts(const LcmOptions& from)
         : options(from),
@@ -39,7 +40,10 @@ struct LcmPublisher::Parts {
           preview_channel(from.prefix + "_PREVIEW"),
           grid_channel(from.prefix + "_GRID"),
           link(resolve_url(from.url)),
-          tracker(from.counters, from.stale_after_ns) {}
+          own_tracker(from.counters, from.stale_after_ns),
+          tracker(from.tracker != nullptr ? *from.tracker : own_tracker),
+          v_disparity(from.channels.v_disparity),
+          preview(from.channels.preview) {}
 
     std::int64_t now() const { return options.clock != nullptr ? options.clock() : now_mono_ns(); }
 
@@ -78,7 +82,10 @@ struct LcmPublisher::Parts {
     std::string preview_channel;
     std::string grid_channel;
     LcmLink link;
-    HealthTracker tracker;
+    HealthTracker own_tracker;
+    HealthTracker& tracker;
+    std::atomic<bool> v_disparity;
+    std::atomic<bool> preview;
     MessageEncoder encoder;
     bool health_sent = false;
     std::int64_t last_health_mono_ns = 0;
@@ -98,13 +105,20 @@ bool LcmPublisher::consume(const FrameResult& result) {
     if (channels.mask) good &= parts.send(parts.mask_channel, encoder.mask(result));
     if (channels.sectors) good &= parts.send(parts.sectors_channel, encoder.sectors(result));
     if (channels.ground) good &= parts.send(parts.ground_channel, encoder.ground(result));
-    if (channels.v_disparity) good &= parts.send(parts.v_disparity_channel, encoder.v_disparity(result));
-    if (channels.preview) good &= parts.send(parts.preview_channel, encoder.preview(result));
+    if (parts.v_disparity.load(std::memory_order_relaxed))
+        good &= parts.send(parts.v_disparity_channel, encoder.v_disparity(result));
+    if (parts.preview.load(std::memory_order_relaxed))
+        good &= parts.send(parts.preview_channel, encoder.preview(result));
     if (channels.grid) good &= parts.send(parts.grid_channel, encoder.grid(result));
     const std::int64_t end_ns = parts.now();
     parts.tracker.note(result, end_ns - start_ns, end_ns);
     if (parts.health_due()) good &= parts.send_health();
     return good;
+}
+
+void LcmPublisher::show(bool v_disparity, bool preview) {
+    parts_->v_disparity.store(v_disparity, std::memory_order_relaxed);
+    parts_->preview.store(preview, std::memory_order_relaxed);
 }
 
 bool LcmPublisher::tick() {

@@ -29,12 +29,18 @@ struct LcmOptions {
     Channels channels;
     // Where kPublishFailures is raised and health reads its counts; may be null, else borrowed.
     Counters* counters = nullptr;
+    // What results are noted in, for whoever reports on them elsewhere; borrowed. Null: one of the
+    // publisher's own.
+    HealthTracker* tracker = nullptr;
     std::int64_t health_period_ns = 100'000'000;
     // No result for that long means that pairs no longer arrive: five pairs at 10 Hz.
     std::int64_t stale_after_ns = 500'000'000;
     // Monotonic ns, for waiting and for durations; null means the computer's. Tests bring their own.
     std::int64_t (*clock)() = nullptr;
 };
+
+// A prefix as it is used; throws Refusal for one that is empty, too long or not of A-Z a-z 0-9 _ . / -.
+std::string checked_prefix(const std::string& prefix);
 
 // Used by one thread. All memory of ours is taken at construction; after that nothing of ours is allocated
 // while messages go out (LCM itself takes a mutex and may allocate). When LCM cannot be opened, results are
@@ -48,6 +54,9 @@ class LcmPublisher final : public Sink {
     // Publishes the frame's messages, and health when it is due. False when any of them did not go out.
     bool consume(const FrameResult& result) override;
     const std::string& error() const override;
+
+    // Any thread: what goes out from the next result on.
+    void show(bool v_disparity, bool preview);
 
     // For times when no result comes, as often as one likes: health when it is due, and while pairs do not
     // arrive sectors_t saying so at the same rate. Never a mask. False when something did not go out.

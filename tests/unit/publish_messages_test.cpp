@@ -268,11 +268,11 @@ TEST(Messages, HealthBytes) {
     double first = 1.0;
     for (const char* stage : {"read", "rectify", "match", "ground", "classify", "write", "publish"})
         golden.text(stage).reals({first++, 2.0, 3.0});
-    golden.text("exposure_to_publish").reals({50.0, 60.0, 70.0}).i32(10);
+    golden.text("exposure_to_publish").reals({50.0, 60.0, 70.0}).i32(11);
     std::int64_t count = 1000;
-    for (const char* name :
-         {"frames_read", "frames_bad", "frames_overwritten", "frames_processed", "results_overwritten",
-          "results_delivered", "sink_failures", "disparity_clamped", "publish_failures"})
+    for (const char* name : {"frames_read", "frames_bad", "frames_overwritten", "frames_processed",
+                             "results_overwritten", "results_delivered", "sink_failures", "disparity_clamped",
+                             "publish_failures", "health_overwritten"})
         golden.text(name).i64(count++);
     golden.text("lcm_open_failures").i64(5);
     golden.reals({0.25, -2.0, 1.03, -1.5, 0.375, 61.5}).i8(1).i8(0).i8(1);

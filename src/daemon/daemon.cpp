@@ -1,0 +1,251 @@
+#include "daemon/daemon.hpp"
+
+#include <fmt/format.h>
+#include <sys/time.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <optional>
+#include <thread>
+
+#include "capture/open.hpp"
+#include "core/arena.hpp"
+#include "core/counters.hpp"
+#include "daemon/driver.hpp"
+#include "daemon/log.hpp"
+#include "daemon/realtime.hpp"
+#include "daemon/service_manager.hpp"
+#include "daemon/supervisor.hpp"
+#include "pipeline/worker_pool.hpp"
+#include "publish/health_publisher.hpp"
+#include "publish/lcm_publisher.hpp"
+#include "setup/run_setup.hpp"
+
+namespace groundline::daemon {
+namespace {
+
+using std::chrono::milliseconds;
+
+// SIGTERM promises the end within a second; what is left after waiting is for the log and the destructors.
+constexpr milliseconds kPatience{600};
+constexpr suseconds_t kDeadlineUs = 900'000;
+
+settings::Settings read_settings(const DaemonOptions& options) {
+    const bool read = options.config_named || std::filesystem::exists(options.config);
+    return setup::load_settings(read ? options.config : std::filesystem::path(), options.set);
+}
+
+// Results and health go out on two connections, which two programs' worth of LCM understands but a file or
+// memory does not.
+publish::LcmOptions lcm_options(const settings::Settings& settings, Counters& counters,
+                                publish::HealthTracker* tracker = nullptr) {
+    publish::LcmOptions options = setup::lcm_options(settings, counters);
+    const std::string url = publish::resolve_url(options.url);
+    if (url.starts_with("file:") || url.starts_with("memq:"))
+        throw Refusal(ExitStatus::kConfig,
+                      fmt::format("publish.url: '{}' cannot be shared by the two connections "
+                                  "of this program; use udpm://, and lcm-logger for files",
+                                  url));
+    options.channels.health = false;  // sent by the supervisor
+    options.tracker = tracker;
+    return options;
+}
+
+pipeline::Tuning tuning_of(const settings::Settings& settings) {
+    return {settings::terrain_config(settings), settings::verdict_limits(settings)};
+}
+
+int lanes_of(const settings::Settings& settings) {
+    const int processors = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+    return settings.process.threads > 0 ? settings.process.threads : processors;
+}
+
+settings::Settings with_disparities(settings::Settings settings, const SourceInfo& info,
+                                    const std::optional<rig::StereoCalibration>& calibration) {
+    setup::choose_disparities(info.width, calibration ? calibration->disparities_hint : 0, settings);
+    return settings;
+}
+
+// Everything with its memory, in the order it is needed; nothing moves yet but the workers that wait.
+struct Parts {
+    explicit Parts(const settings::Settings& wanted)
+        : opened(open_driver(wanted.capture)),
+          calibration(setup::load_calibration(calibration_files(wanted.capture), opened)),
+          settings(with_disparities(wanted, info(), calibration)),
+          rectifier(calibration ? rig::Rectifier(*calibration, info().width, info().height, arena)
+                                : rig::Rectifier(info().width, info().height)),
+          real_time(settings.realtime),
+          pool(lanes_of(settings), [this] { real_time.adopt(pipeline::ThreadRole::kProcessing); }),
+          processor(setup::processor_config(settings, info(), false, arena), rectifier, pool, arena),
+          tracker(&counters, publish::LcmOptions().stale_after_ns),
+          publisher(lcm_options(settings, counters, &tracker)),
+          health(lcm_options(settings, counters)),
+          sinks{{{&publisher, Stage::kPublish, false}}},
+          running(*opened.source, processor, sinks, false, arena, counters) {
+        arena.seal();
+    }
+
+    // The pipeline's run; on a thread of its own, which becomes the capture thread.
+    void run(const std::atomic<bool>& stop) {
+        pipeline::RunOptions options;
+        if (!info().live) {
+            options.pace = pipeline::Pace::kStamps;
+            options.stamp_when_due = true;
+            options.loop = settings.capture.loop;
+        }
+        options.on_thread = [this](pipeline::ThreadRole role) {
+            // A renderer is no camera: it may take all the time there is, and more.
+            if (role != pipeline::ThreadRole::kCapture || !opened.rig) real_time.adopt(role);
+            ++threads;
+        };
+        // Counted by the pipeline; the supervisor says so.
+        running.run(
+            options, stop, [](const FrameStamp&, const std::string&) {}, report);
+    }
+
+    // Reads the configuration again and takes over what a running pipeline can.
+    void reload(const DaemonOptions& options) {
+        settings::Reload change;
+        try {
+            change = settings::reload(settings, read_settings(options));
+            running.tune(tuning_of(change.settings));
+        } catch (const Refusal& refusal) {
+            log().error("the new configuration is refused, the old one stays in force: {}", refusal.what());
+            return;
+        }
+        settings = change.settings;
+        publisher.show(settings.publish.v_disparity, settings.publish.preview);
+        log().info("configuration read again; taken over: {}",
+                   change.taken.empty() ? "nothing new" : fmt::format("{}", fmt::join(change.taken, ", ")));
+        if (!change.need_restart.empty())
+            log().warn("these changes need a restart: {}", fmt::join(change.need_restart, ", "));
+    }
+
+    void introduce() const {
+        const RectifiedRig& rig = rectifier.rig();
+        log().info("source {}: {}x{}", info().name, info().width, info().height);
+        if (!opened.note.empty()) log().warn("{}", opened.note);
+        if (calibration)
+            log().info("calibration {} ({}): f {:.2f} px, baseline {:.4f} m", calibration->source,
+                       calibration->format, rig.focal_px, rig.baseline_m);
+        else
+            log().warn("no calibration: the pair is taken as rectified, the verdict is degraded at best");
+        for (const std::string& warning : rectifier.warnings())
+            log().warn("{}", warning);
+        log().info("matching {} disparities on {} threads, {:.0f} MB for frames, LCM at {}",
+                   settings.matcher.disparities, pool.lanes(), static_cast<double>(arena.bytes()) / 1e6,
+                   publisher.url());
+    }
+
+    const SourceInfo& info() const { return opened.source->info(); }
+
+    Counters counters;
+    Arena arena;
+    capture::OpenedSource opened;
+    std::optional<rig::StereoCalibration> calibration;
+    settings::Settings settings;
+    rig::Rectifier rectifier;
+    RealTime real_time;
+    pipeline::WorkerPool pool;
+    pipeline::Processor processor;
+    publish::HealthTracker tracker;
+    publish::LcmPublisher publisher;
+    publish::HealthPublisher health;
+    std::array<pipeline::SinkSlot, 1> sinks;
+    pipeline::Pipeline running;
+    pipeline::RunReport report;
+    std::atomic<int> threads{0};  // of the pipeline, that have begun
+};
+
+// Waits until `done`, at most kPatience.
+bool wait_for(const std::atomic<bool>& done) {
+    for (milliseconds waited{0}; waited < kPatience && !done.load(); waited += milliseconds(5))
+        std::this_thread::sleep_for(milliseconds(5));
+    return done.load();
+}
+
+// From now on the program ends in time whatever hangs: a camera, the network, the journal.
+void arm_deadline() {
+    struct sigaction action {};
+    action.sa_handler = [](int) { _exit(static_cast<int>(ExitStatus::kDone)); };
+    sigaction(SIGALRM, &action, nullptr);
+    const itimerval once{{0, 0}, {0, kDeadlineUs}};
+    setitimer(ITIMER_REAL, &once, nullptr);
+}
+
+}  // namespace
+
+void block_signals() {
+    sigset_t set;
+    sigemptyset(&set);
+    for (const int each : {SIGTERM, SIGINT, SIGHUP, SIGXCPU})
+        sigaddset(&set, each);
+    pthread_sigmask(SIG_BLOCK, &set, nullptr);
+    signal(SIGPIPE, SIG_IGN);
+}
+
+ExitStatus run_daemon(const DaemonOptions& options) {
+    ServiceManager manager;
+    if (!options.config_named && !std::filesystem::exists(options.config))
+        say(5, fmt::format("{} does not exist: every key has its default", options.config.string()));
+    const auto parts = std::make_unique<Parts>(read_settings(options));
+    if (options.check_only) {
+        fmt::print("{}: the configuration is good\n", options.config.string());
+        return ExitStatus::kDone;
+    }
+    parts->introduce();
+
+    std::atomic<bool> stop{false};
+    std::string failure;  // of the pipeline's start; written before pipeline_ended
+    std::atomic<bool> pipeline_ended{false};
+    std::atomic<bool> health_ended{false};
+    Supervisor supervisor({parts->running, parts->counters, parts->tracker, parts->health, manager,
+                           parts->real_time, pipeline_ended, [&] { parts->reload(options); }});
+    std::jthread health([&] {
+        pthread_setname_np(pthread_self(), "gl-health");
+        supervisor.send_health();
+        health_ended = true;
+    });
+    std::jthread pipeline([&] {
+        try {
+            parts->run(stop);
+        } catch (const std::exception& fault) {
+            failure = fault.what();  // no more threads, say
+        }
+        pipeline_ended = true;
+    });
+    bool locked = false;
+    const bool told_to_stop = supervisor.run([&] {
+        if (parts->threads.load() < 3) return false;
+        if (!std::exchange(locked, true)) parts->real_time.lock_memory();
+        return true;
+    });
+
+    manager.tell("STOPPING=1\nSTATUS=stopping");
+    arm_deadline();
+    stop = true;
+    supervisor.end_health();
+    const bool ended = wait_for(pipeline_ended) && wait_for(health_ended);
+    if (!ended)
+        log().warn("a camera or the network does not let go: the program ends without waiting for it");
+    ExitStatus status = ExitStatus::kDone;
+    if (!told_to_stop && !parts->report.source_error.empty()) {
+        log().error("{}", parts->report.source_error);
+        status = ExitStatus::kInput;
+    }
+    if (ended && !failure.empty()) {
+        log().error("{}", failure);
+        status = ExitStatus::kFailed;
+    }
+    log().info("ended");
+    close_log();
+    // Threads that hang can neither be joined nor outlive what they use.
+    if (!ended) _exit(static_cast<int>(status));
+    return status;
+}
+
+}  // namespace groundline::daemon

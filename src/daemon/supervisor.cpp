@@ -1,0 +1,201 @@
+#include "daemon/supervisor.hpp"
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/signalfd.h>
+#include <sys/timerfd.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <system_error>
+
+#include "core/clock.hpp"
+#include "daemon/log.hpp"
+#include "daemon/status.hpp"
+
+namespace groundline::daemon {
+namespace {
+
+constexpr std::int64_t kTickNs = 100'000'000;
+constexpr std::int64_t kSecondNs = 1'000'000'000;
+// Without a watchdog a thread that stands still is only named, after as long as the usual watchdog would
+// take.
+constexpr std::int64_t kStillNs = 5 * kSecondNs;
+
+// A descriptor that closes itself.
+class Descriptor {
+  public:
+    Descriptor(int descriptor, const char* what) : descriptor_(descriptor) {
+        if (descriptor_ < 0) throw std::system_error(errno, std::generic_category(), what);
+    }
+    ~Descriptor() { ::close(descriptor_); }
+    Descriptor(const Descriptor&) = delete;
+    Descriptor& operator=(const Descriptor&) = delete;
+    int get() const { return descriptor_; }
+
+  private:
+    int descriptor_;
+};
+
+sigset_t waited_signals() {
+    sigset_t set;
+    sigemptyset(&set);
+    for (const int each : {SIGTERM, SIGINT, SIGHUP, SIGXCPU})
+        sigaddset(&set, each);
+    return set;
+}
+
+}  // namespace
+
+Supervisor::Supervisor(const Watched& watched) : watched_(watched) {}
+
+bool Supervisor::run(const std::function<bool()>& ready) {
+    const sigset_t waited = waited_signals();
+    const Descriptor signals(signalfd(-1, &waited, SFD_CLOEXEC | SFD_NONBLOCK), "cannot wait for signals");
+    const Descriptor timer(timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK),
+                           "cannot make a timer");
+    const itimerspec every{{0, kTickNs}, {0, kTickNs}};
+    timerfd_settime(timer.get(), 0, &every, nullptr);
+    while (!watched_.pipeline_ended.load()) {
+        pollfd events[] = {{signals.get(), POLLIN, 0}, {timer.get(), POLLIN, 0}};
+        poll(events, 2, -1);
+        signalfd_siginfo signal{};
+        while (read(signals.get(), &signal, sizeof signal) == static_cast<ssize_t>(sizeof signal)) {
+            if (signal.ssi_signo == SIGTERM || signal.ssi_signo == SIGINT) return true;
+            if (signal.ssi_signo == SIGHUP) {
+                watched_.manager.tell(fmt::format("RELOADING=1\nMONOTONIC_USEC={}", now_mono_ns() / 1000));
+                watched_.reload();
+                watched_.manager.tell("READY=1");
+            } else {
+                watched_.real_time.give_up();
+                log().warn(
+                    "a real-time thread ran for {} s without a pause: real-time scheduling is given up",
+                    RealTime::kLongestRunUs / 1'000'000);
+            }
+        }
+        std::uint64_t ticks = 0;
+        if (read(timer.get(), &ticks, sizeof ticks) != static_cast<ssize_t>(sizeof ticks)) continue;
+        if (!ready_ && ready()) {
+            ready_ = true;
+            for (const std::string& warning : watched_.real_time.warnings())
+                log().warn("{}", warning);
+            watched_.manager.tell("READY=1");
+            log().info("ready");
+        }
+        tick(now_mono_ns());
+    }
+    return false;
+}
+
+void Supervisor::tick(std::int64_t now_mono_ns) {
+    if (host_mono_ns_ == 0 || now_mono_ns - host_mono_ns_ >= kSecondNs) {
+        host_mono_ns_ = now_mono_ns;
+        sensors_.read(host_);
+    }
+    host_.realtime_scheduling = watched_.real_time.scheduling() ? 1 : 0;
+    host_.memory_locked = watched_.real_time.memory_locked() ? 1 : 0;
+    watched_.tracker.add(host_);
+    const publish::HealthReport report = watched_.tracker.report(now_utime_us(), now_mono_ns);
+    hand_over_health(report);
+    watch(now_mono_ns);
+    log_changes(report, now_mono_ns);
+    tell_status(report, now_mono_ns);
+}
+
+void Supervisor::hand_over_health(const publish::HealthReport& report) {
+    *reports_.begin_write() = report;
+    if (reports_.commit()) watched_.counters.add(Count::kHealthOverwritten);
+}
+
+void Supervisor::watch(std::int64_t now_mono_ns) {
+    const std::int64_t limit_ns = watched_.manager.watchdog_ns();
+    const Counters& counters = watched_.counters;
+    verdict::Progress progress;
+    progress.capture_turns = watched_.pipeline.capture_turns();
+    progress.captured = counters.get(Count::kFramesRead);
+    progress.capture_lost = counters.get(Count::kFramesOverwritten);
+    progress.processed = counters.get(Count::kFramesProcessed);
+    progress.results_lost = counters.get(Count::kResultsOverwritten);
+    progress.delivered = counters.get(Count::kResultsDelivered);
+    progress.health_beats = health_beats_.load();
+    const verdict::Liveness look =
+        verdict::judge_liveness(progress, liveness_, now_mono_ns, limit_ns > 0 ? limit_ns / 2 : kStillNs);
+    liveness_ = look.state;
+    if (look.stuck != stuck_) {
+        if (look.stuck == verdict::Stuck::kNone)
+            log().warn("every thread moves again");
+        else
+            log().error("the thread for {} has not moved for {:.1f} s",
+                        verdict::kStuckNames[static_cast<std::size_t>(look.stuck)],
+                        static_cast<double>(look.still_ns) / 1e9);
+        stuck_ = look.stuck;
+    }
+    if (limit_ns == 0) return;
+    if (look.stuck == verdict::Stuck::kNone) {
+        // The tick before half the time is up, so that none comes after it.
+        if (fed_mono_ns_ != 0 && now_mono_ns - fed_mono_ns_ < limit_ns / 2 - kTickNs) return;
+        fed_mono_ns_ = now_mono_ns;
+        watched_.manager.tell("WATCHDOG=1");
+    } else if (!triggered_ && look.still_ns >= limit_ns - 2 * kTickNs) {
+        // Else the manager would count from the last feeding, up to half a limit later.
+        triggered_ = true;
+        watched_.manager.tell("WATCHDOG=trigger");
+    }
+}
+
+void Supervisor::log_changes(const publish::HealthReport& report, std::int64_t now_mono_ns) {
+    using publish::LifeState;
+    if (report.state != logged_state_ && now_mono_ns - state_mono_ns_ >= kSecondNs) {
+        if (report.state == LifeState::kRunning)
+            log().info("pairs come");
+        else
+            log().warn("{}", status_of(report));
+        logged_state_ = report.state;
+        state_mono_ns_ = now_mono_ns;
+    }
+    const std::string verdict = verdict_of(report);
+    if (report.state == LifeState::kRunning && verdict != logged_verdict_ &&
+        now_mono_ns - verdict_mono_ns_ >= kSecondNs) {
+        log().log(report.verdict == Verdict::kTrusted ? spdlog::level::info : spdlog::level::warn,
+                  "verdict: {}", verdict);
+        logged_verdict_ = verdict;
+        verdict_mono_ns_ = now_mono_ns;
+    }
+    const std::uint64_t bad = watched_.counters.get(Count::kFramesBad);
+    if (bad != logged_bad_ && (logged_bad_ == 0 || now_mono_ns - bad_mono_ns_ >= 60 * kSecondNs)) {
+        log().warn("{} pairs so far could not be read and are left out", bad);
+        logged_bad_ = bad;
+        bad_mono_ns_ = now_mono_ns;
+    }
+}
+
+void Supervisor::tell_status(const publish::HealthReport& report, std::int64_t now_mono_ns) {
+    if (status_mono_ns_ != 0 && now_mono_ns - status_mono_ns_ < kSecondNs) return;
+    std::string status = status_of(report);
+    if (status == status_) return;
+    watched_.manager.tell("STATUS=" + status);
+    status_ = std::move(status);
+    status_mono_ns_ = now_mono_ns;
+}
+
+void Supervisor::send_health() {
+    bool failing = false;
+    while (const publish::HealthReport* report = reports_.take()) {
+        const bool sent = watched_.health.publish(*report);
+        ++health_beats_;
+        if (sent == !failing) continue;
+        failing = !sent;
+        if (failing)
+            log().warn("{}", watched_.health.error());
+        else
+            log().info("LCM takes messages");
+    }
+}
+
+void Supervisor::end_health() {
+    watched_.tracker.stop();
+    hand_over_health(watched_.tracker.report(now_utime_us(), now_mono_ns()));
+    reports_.end_of_stream();
+}
+
+}  // namespace groundline::daemon
