@@ -11,6 +11,10 @@
 namespace groundline {
 
 inline constexpr int kDisparityOne = 16;  // disparity_q4 of one pixel
+// The nearest whole disparity, the upper of two.
+inline constexpr int whole_px(int disparity_q4) {
+    return (disparity_q4 + kDisparityOne / 2) >> 4;
+}
 
 // Why a pixel has no disparity. kNone means the disparity holds. The numbers are stable.
 enum class Invalid : std::uint8_t {

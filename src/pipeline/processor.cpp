@@ -156,7 +156,7 @@ void Processor::mark_unusable_pixels(const DisparityMap& map) {
             Invalid reason = left.empty() ? Invalid::kNone : static_cast<Invalid>(left.at(x, y));
             if (reason != Invalid::kBody && invalid[x] != Invalid::kNone) continue;
             if (reason == Invalid::kNone && !right.empty()) {
-                const int matched = x - (disparity[x] + kDisparityOne / 2) / kDisparityOne;
+                const int matched = x - whole_px(disparity[x]);
                 if (matched >= 0 && matched < map.width())
                     reason = static_cast<Invalid>(right.at(matched, y));
             }

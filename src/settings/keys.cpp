@@ -282,6 +282,10 @@ std::vector<Key> make_keys() {
     keys.push_back(whole("stereo.speckle_px", 0, 100000,
                          "With checks: patches with fewer pixels are not believed; 0 is off.",
                          GROUNDLINE_MEMBER(matcher.limits.speckle_px)));
+    keys.push_back(whole("stereo.alike_percent", 0, 100,
+                         "With checks: least percent of the pairs of pixels in a patch that both views order "
+                         "alike; 0 is off.",
+                         GROUNDLINE_MEMBER(matcher.limits.alike_percent)));
     keys.push_back(on_off("stereo.median", "With checks: smooth what is left by a 3x3 median.",
                           GROUNDLINE_MEMBER(matcher.limits.median)));
     keys.push_back(choice<RuleOne>(

@@ -170,7 +170,7 @@ void match(const MatcherConfig& config, bool coarse, ConstLuma left, ConstLuma r
                 static_cast<std::int16_t>(coarse || invalid == Invalid::kNone ? disparity_q4 : 0);
             out.invalid.at(x, y) = invalid;
         }
-    if (config.checks && !coarse) finish_map(out, limits);
+    if (config.checks && !coarse) finish_map(out, left, right, limits);
 }
 
 }  // namespace

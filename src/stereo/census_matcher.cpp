@@ -64,13 +64,14 @@ CensusMatcher::CensusMatcher(const MatcherConfig& config, int width, int height,
     : config_(resolved(config)), coarse_(use == Use::kCoarse), width_(width), height_(height) {
     if (coarse_) {
         config_.limits.speckle_px = 0;
+        config_.limits.alike_percent = 0;
         config_.limits.median = false;
     }
     const std::size_t before = arena.bytes();
     lanes_.reserve(static_cast<std::size_t>(lanes));
     for (int lane = 0; lane < lanes; ++lane)
         lanes_.emplace_back(config_, width, arena);
-    if (config_.checks && config_.limits.speckle_px > 0) speckles_ = SpeckleScratch(width, arena);
+    if (config_.checks && judges_patches(config_.limits)) speckles_ = SpeckleScratch(width, arena);
     if (config_.checks && config_.limits.median)
         median_rows_ = arena.take<std::int16_t>(2 * static_cast<std::size_t>(width));
     state_bytes_ = arena.bytes() - before;
@@ -85,7 +86,9 @@ void CensusMatcher::match(ConstLuma left, ConstLuma right, const DisparityMap& o
     parallel.for_each(band_count(height_), [&](int number, int lane) {
         match_band(left, right, number, lanes_[static_cast<std::size_t>(lane)], out);
     });
-    if (!speckles_.patches.empty()) remove_speckles(out, config_.limits.speckle_px, speckles_);
+    if (!speckles_.patches.empty())
+        remove_speckles(out, left, right, {config_.limits.speckle_px, config_.limits.alike_percent},
+                        speckles_);
     if (!median_rows_.empty()) median_3x3(out, median_rows_);
 }
 

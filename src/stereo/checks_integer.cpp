@@ -34,11 +34,11 @@ Invalid window_reason(ConstLuma given, ConstLuma matched, int x, int y, const Ch
     return texture < limits.texture ? Invalid::kTexture : Invalid::kNone;
 }
 
-void finish_map(const DisparityMap& map, const CheckLimits& limits) {
+void finish_map(const DisparityMap& map, ConstLuma left, ConstLuma right, const CheckLimits& limits) {
     Arena arena;
-    if (limits.speckle_px > 0) {
+    if (judges_patches(limits)) {
         SpeckleScratch scratch(map.width(), arena);
-        remove_speckles(map, limits.speckle_px, scratch);
+        remove_speckles(map, left, right, {limits.speckle_px, limits.alike_percent}, scratch);
     }
     if (limits.median) median_3x3(map, arena.take<std::int16_t>(2 * static_cast<std::size_t>(map.width())));
 }

@@ -11,7 +11,8 @@ namespace groundline::stereo {
 // as the matcher saw it.
 Invalid window_reason(ConstLuma given, ConstLuma matched, int x, int y, const CheckLimits& limits);
 
-// What comes after all pixels are judged: speckles, then the median if asked for. For tests: it allocates.
-void finish_map(const DisparityMap& map, const CheckLimits& limits);
+// What comes after all pixels are judged: patches against the views as they came, then the median if asked
+// for. For tests: it allocates.
+void finish_map(const DisparityMap& map, ConstLuma left, ConstLuma right, const CheckLimits& limits);
 
 }  // namespace groundline::stereo

@@ -190,7 +190,7 @@ void match_paper_integer(const MatcherConfig& given, ConstLuma left, ConstLuma r
                 static_cast<std::int16_t>(invalid == Invalid::kNone ? disparity_q4 : 0);
             out.invalid.at(x, y) = invalid;
         }
-    if (config.checks) finish_map(out, limits);
+    if (config.checks) finish_map(out, left, right, limits);
 }
 
 }  // namespace groundline::stereo

@@ -128,7 +128,7 @@ PaperMatcher::PaperMatcher(const MatcherConfig& config, int width, int height, i
         plain_left_ = arena.image<std::uint8_t>(width, height);
         plain_right_ = arena.image<std::uint8_t>(width, height);
     }
-    if (config.checks && config.limits.speckle_px > 0) speckles_ = SpeckleScratch(width, arena);
+    if (config.checks && judges_patches(config.limits)) speckles_ = SpeckleScratch(width, arena);
     if (config.checks && config.limits.median)
         median_rows_ = arena.take<std::int16_t>(2 * static_cast<std::size_t>(width));
     state_bytes_ = arena.bytes() - before;
@@ -165,7 +165,9 @@ void PaperMatcher::match(ConstLuma left, ConstLuma right, const DisparityMap& ou
                 answer_row(lane.winners.index.row(y - first), y, out);
         }
     });
-    if (!speckles_.patches.empty()) remove_speckles(out, config_.limits.speckle_px, speckles_);
+    if (!speckles_.patches.empty())
+        remove_speckles(out, left, right, {config_.limits.speckle_px, config_.limits.alike_percent},
+                        speckles_);
     if (!median_rows_.empty()) median_3x3(out, median_rows_);
 }
 

@@ -34,7 +34,7 @@ class Pyramid {
         replace_by_thin();
         for (int y = 0; y < left_.height; ++y)
             answer_row(y, out);
-        if (config_.checks) finish_map(out, config_.limits);
+        if (config_.checks) finish_map(out, left_, right_, config_.limits);
     }
 
   private:
@@ -77,7 +77,7 @@ class Pyramid {
     }
 
     int predicted_index(int x, int y) const {
-        return ((prediction_.q4[index(x, y)] + kDisparityOne / 2) >> 4) - config_.min_disparity;
+        return whole_px(prediction_.q4[index(x, y)]) - config_.min_disparity;
     }
 
     // Cost of one column of the tall window at sampled row `row`.

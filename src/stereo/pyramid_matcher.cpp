@@ -124,7 +124,7 @@ PyramidMatcher::PyramidMatcher(const MatcherConfig& config, int width, int heigh
     lanes_.reserve(static_cast<std::size_t>(lanes));
     for (int lane = 0; lane < lanes; ++lane)
         lanes_.emplace_back(config_, width, arena);
-    if (config_.checks && config_.limits.speckle_px > 0) speckles_ = SpeckleScratch(width, arena);
+    if (config_.checks && judges_patches(config_.limits)) speckles_ = SpeckleScratch(width, arena);
     if (config_.checks && config_.limits.median)
         median_rows_ = arena.take<std::int16_t>(2 * static_cast<std::size_t>(width));
     state_bytes_ = arena.bytes() - before;
@@ -154,7 +154,9 @@ void PyramidMatcher::match(ConstLuma left, ConstLuma right, const DisparityMap& 
         find_thin(left, right, part_of(number), lane);
         refine(left, right, part_of(number), lane, out);
     });
-    if (!speckles_.patches.empty()) remove_speckles(out, config_.limits.speckle_px, speckles_);
+    if (!speckles_.patches.empty())
+        remove_speckles(out, left, right, {config_.limits.speckle_px, config_.limits.alike_percent},
+                        speckles_);
     if (!median_rows_.empty()) median_3x3(out, median_rows_);
 }
 

@@ -140,6 +140,8 @@ void unite(std::int32_t own_index, std::int32_t other_index, int smallest, Speck
     Patch& other = at(scratch.patches, other_index);
     other.parent = own_index;
     own.size += other.size;
+    own.compared += other.compared;
+    own.alike += other.alike;
     if (own.size >= smallest || own.head == SpeckleScratch::kNoList ||
         other.head == SpeckleScratch::kNoList) {
         drop_list(own, scratch);
@@ -184,7 +186,7 @@ HWY_INLINE bool alike(int a, int b) {
 // notes in the reasons where it entered a run and goes back there when it has seen the run's neighbours
 // below, from left to right, and above, from right to left. So it needs no memory however large the patch,
 // and meets each pixel a fixed number of times.
-void erase_by_walk(const DisparityMap& map, int x, int y) {
+void erase_by_walk(const DisparityMap& map, int x, int y, Invalid reason) {
     constexpr auto kPassed = static_cast<Invalid>(128);     // in a run not yet done with; above every reason
     constexpr auto kFromAbove = static_cast<Invalid>(129);  // the same, and entered here
     constexpr auto kFromBelow = static_cast<Invalid>(130);
@@ -246,7 +248,7 @@ void erase_by_walk(const DisparityMap& map, int x, int y) {
                 from = invalid[x];
                 entry = x;
             }
-            invalid[x] = Invalid::kSpeckle;
+            invalid[x] = reason;
             disparity[x] = 0;
         }
         if (from == kFromNowhere) return;
@@ -256,9 +258,9 @@ void erase_by_walk(const DisparityMap& map, int x, int y) {
     }
 }
 
-void erase(Patch& patch, SpeckleScratch& scratch, const DisparityMap& map) {
+void erase(Patch& patch, Invalid because, SpeckleScratch& scratch, const DisparityMap& map) {
     if (patch.head == SpeckleScratch::kNoList)
-        return erase_by_walk(map, patch.seed % map.width(), patch.seed / map.width());
+        return erase_by_walk(map, patch.seed % map.width(), patch.seed / map.width(), because);
     std::int32_t left = patch.size;
     for (std::int32_t index = patch.head; left > 0; index = run_at(scratch, index).next) {
         const SpeckleScratch::Run& run = run_at(scratch, index);
@@ -266,23 +268,64 @@ void erase(Patch& patch, SpeckleScratch& scratch, const DisparityMap& map) {
         Invalid* const invalid = map.invalid.row(run.y);
         for (int x = run.first; x <= run.last; ++x) {
             disparity[x] = 0;
-            invalid[x] = Invalid::kSpeckle;
+            invalid[x] = because;
         }
         left -= run.last - run.first + 1;
     }
     drop_list(patch, scratch);
 }
 
+// The views in one row and kComparedRows above and below it.
+struct PairRows {
+    std::array<const std::uint8_t*, 3> left{};
+    std::array<const std::uint8_t*, 3> right{};
+    int width = 0;
+    bool inside = false;
+
+    PairRows(ConstLuma left_view, ConstLuma right_view, int y)
+        : width(left_view.width), inside(y >= kComparedRows && y + kComparedRows < left_view.height) {
+        if (!inside) return;
+        left = {left_view.row(y - kComparedRows), left_view.row(y), left_view.row(y + kComparedRows)};
+        right = {right_view.row(y - kComparedRows), right_view.row(y), right_view.row(y + kComparedRows)};
+    }
+};
+
+// Compares the views around the pixels x .. last of a run and adds what was found to its patch.
+void compare_views(const PairRows& rows, const std::int16_t* disparity_q4, int x, int last, Patch& patch) {
+    if (!rows.inside) return;
+    const auto within = [&](int column) HWY_ATTR {
+        return column >= kComparedReach && column + kComparedReach < rows.width;
+    };
+    const auto alike = [](const std::uint8_t* left, const std::uint8_t* right, int apart) HWY_ATTR {
+        const auto order = [apart](const std::uint8_t* pixel) HWY_ATTR {
+            return (pixel[apart] > pixel[-apart] ? 1 : 0) - (pixel[apart] < pixel[-apart] ? 1 : 0);
+        };
+        return order(left) == order(right) ? 1 : 0;
+    };
+    for (; x <= last; ++x) {
+        const int match = x - whole_px(disparity_q4[x]);
+        if (!within(x) || !within(match)) continue;
+        patch.compared += 4;
+        patch.alike += alike(rows.left[1] + x, rows.right[1] + match, 2) +
+                       alike(rows.left[1] + x, rows.right[1] + match, 4) +
+                       alike(rows.left[0] + x, rows.right[0] + match, 3) +
+                       alike(rows.left[2] + x, rows.right[2] + match, 3);
+    }
+}
+
 // Ends what runs of this row belonged to before it was found to go no further than row `y` - 1, or to be part
 // of another patch.
-int end_patches(const Row& row, int y, int smallest, int unused, SpeckleScratch& scratch,
+int end_patches(const Row& row, int y, const PatchLimits& limits, int unused, SpeckleScratch& scratch,
                 const DisparityMap& map) {
     for (int run = 0; run < row.runs; ++run) {
         const std::int32_t index = row.patch[static_cast<std::size_t>(run)];
         Patch& patch = at(scratch.patches, index);
         if (patch.parent == index) {
             if (patch.last_row == y) continue;  // goes on, or ended by an earlier run
-            if (patch.size < smallest) erase(patch, scratch, map);
+            if (patch.size < limits.smallest)
+                erase(patch, Invalid::kSpeckle, scratch, map);
+            else if (patch.size < kLargestJudged && 100 * patch.alike < limits.alike_percent * patch.compared)
+                erase(patch, Invalid::kCost, scratch, map);
         }
         patch.parent = index;
         patch.last_row = y;
@@ -291,7 +334,8 @@ int end_patches(const Row& row, int y, int smallest, int unused, SpeckleScratch&
     return unused;
 }
 
-void remove_speckles(const DisparityMap& map, int smallest, SpeckleScratch& scratch) {
+void remove_speckles(const DisparityMap& map, ConstLuma left, ConstLuma right, const PatchLimits& limits,
+                     SpeckleScratch& scratch) {
     const int width = map.width();
     const int height = map.height();
     Row* row = &scratch.rows[0];
@@ -310,7 +354,8 @@ void remove_speckles(const DisparityMap& map, int smallest, SpeckleScratch& scra
                            map.invalid.row(y), width, row->valid.data(), scratch.like_right.data(),
                            scratch.like_above.data());
         find_runs(*row, scratch);
-        join_above(*row, *above, smallest, scratch);
+        join_above(*row, *above, limits.smallest, scratch);
+        const PairRows pair(left, right, y);
         std::size_t next = 0;
         for (std::size_t i = 0; i < row->first.size(); ++i)
             for_each_bit(row->first[i], static_cast<int>(i) * kWordBits, [&](int x) HWY_ATTR {
@@ -320,19 +365,21 @@ void remove_speckles(const DisparityMap& map, int smallest, SpeckleScratch& scra
                 index = is_new ? scratch.unused[static_cast<std::size_t>(--unused)]
                                : root_of(scratch.patches, index);
                 Patch& patch = at(scratch.patches, index);
-                if (is_new) patch = {index, 0, y * width + x, y, SpeckleScratch::kNoList, 0};
+                if (is_new) patch = {index, 0, 0, 0, y * width + x, y, SpeckleScratch::kNoList, 0};
                 const bool listed = is_new || patch.head != SpeckleScratch::kNoList;
+                if (limits.alike_percent > 0 && patch.size < kLargestJudged)
+                    compare_views(pair, map.disparity_q4.row(y), x, last, patch);
                 patch.size += last - x + 1;
                 patch.last_row = y;
-                if (patch.size >= smallest)
+                if (patch.size >= limits.smallest)
                     drop_list(patch, scratch);
                 else if (listed)
                     list_run(patch, {0, y, x, last}, scratch);
             });
-        unused = end_patches(*above, y, smallest, unused, scratch, map);
+        unused = end_patches(*above, y, limits, unused, scratch, map);
         std::swap(row, above);
     }
-    end_patches(*above, height, smallest, unused, scratch, map);
+    end_patches(*above, height, limits, unused, scratch, map);
 }
 
 }  // namespace
@@ -362,9 +409,11 @@ SpeckleScratch::SpeckleScratch(int width, Arena& arena) {
     runs = arena.take<Run>(2 * columns);
 }
 
-void remove_speckles(const DisparityMap& map, int smallest, SpeckleScratch& scratch) {
+void remove_speckles(const DisparityMap& map, ConstLuma left, ConstLuma right, const PatchLimits& limits,
+                     SpeckleScratch& scratch) {
     assert(static_cast<std::size_t>(map.width()) == scratch.last.size());
-    HWY_DYNAMIC_DISPATCH(remove_speckles)(map, smallest, scratch);
+    assert(left.same_size(map.width(), map.height()) && right.same_size(map.width(), map.height()));
+    HWY_DYNAMIC_DISPATCH(remove_speckles)(map, left, right, limits, scratch);
 }
 
 }  // namespace groundline::stereo

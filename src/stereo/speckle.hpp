@@ -1,4 +1,4 @@
-// Takes out patches of disparity too small to believe.
+// Takes out patches of disparity too small, or too unlike in the two views, to believe.
 #pragma once
 
 #include <array>
@@ -7,6 +7,7 @@
 
 #include "core/arena.hpp"
 #include "core/disparity.hpp"
+#include "core/image.hpp"
 
 namespace groundline::stereo {
 
@@ -25,7 +26,10 @@ struct SpeckleScratch {
     struct Patch {
         std::int32_t parent;  // itself, or the patch it was found to be part of
         std::int32_t size;
-        std::int32_t seed;  // any of its pixels, y * width + x
+        std::int32_t
+            compared;        // pairs of pixels that were compared in both views, while size < kLargestJudged
+        std::int32_t alike;  // those that were ordered alike
+        std::int32_t seed;   // any of its pixels, y * width + x
         std::int32_t last_row;
         std::int32_t head;  // list of its runs; kNoList when it is large, or `runs` were used up
         std::int32_t tail;
@@ -51,9 +55,26 @@ struct SpeckleScratch {
     std::int32_t unused_run = 0;  // list of them
 };
 
-// Marks as kSpeckle each valid pixel whose patch has fewer than `smallest` pixels. A patch is connected over
-// left, right, upper and lower neighbours whose disparities differ by at most one pixel. Time is bounded by
-// n log n whatever the picture. Rows of `map` keep the padding contract; `scratch` is made for their width.
-void remove_speckles(const DisparityMap& map, int smallest, SpeckleScratch& scratch);
+// Pixels of a patch that is believed without comparing the views; noise forms patches of up to 1600.
+inline constexpr int kLargestJudged = 4096;
+// Of the pairs of pixels that are compared around each pixel: beside it at 2 and 4 px, and at 3 px two rows
+// above and below. Level pairs alone, because a level edge looks alike at any disparity.
+inline constexpr int kComparedReach = 4;
+inline constexpr int kComparedRows = 2;
+
+// What makes a patch worth believing.
+struct PatchLimits {
+    int smallest = 0;       // pixels; with fewer it is kSpeckle
+    int alike_percent = 0;  // of its pairs that both views must order alike; with fewer it is kCost
+};
+
+// Marks the valid pixels of each patch that misses a limit. A patch is connected over left, right, upper and
+// lower neighbours whose disparities differ by at most one pixel. A pair of opposite pixels around a pixel is
+// ordered alike when the brighter one (or neither) is the same around its match, at the nearest whole
+// disparity, in `right`; pairs that leave a picture are not compared. `left` and `right` are the views as
+// they came, of the size of `map`. Time is bounded by n log n whatever the picture. Rows of `map` keep the
+// padding contract; `scratch` is made for their width.
+void remove_speckles(const DisparityMap& map, ConstLuma left, ConstLuma right, const PatchLimits& limits,
+                     SpeckleScratch& scratch);
 
 }  // namespace groundline::stereo

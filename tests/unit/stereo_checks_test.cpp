@@ -205,6 +205,7 @@ void remove_speckles_plainly(const DisparityMap& map, int smallest) {
 TEST(StereoChecks, SpecklesAreTheSmallPatchesOfAFloodFill) {
     for (const std::uint32_t seed : {1U, 2U, 3U, 4U})
         for (const int levels : {2, 3, 6, 40}) {
+            const test::OwnedLuma blank = test::noise_image(73, 51, 1);
             OwnedResult fast(73, 51);
             OwnedResult plain(73, 51);
             std::mt19937 random(seed);
@@ -220,10 +221,41 @@ TEST(StereoChecks, SpecklesAreTheSmallPatchesOfAFloodFill) {
                 }
             Arena arena;
             SpeckleScratch scratch(73, arena);
-            remove_speckles(fast.map, 9, scratch);
+            remove_speckles(fast.map, blank.view(), blank.view(), {9, 0}, scratch);
             remove_speckles_plainly(plain.map, 9);
             ASSERT_EQ(differing_pixels(fast, plain), 0) << "seed " << seed << " levels " << levels;
         }
+}
+
+// Textured ground under a sky that holds nothing but each camera's own noise.
+TEST(StereoChecks, NoiseInThePlainSkyIsNoAnswer) {
+    constexpr int kWidth = 320;
+    constexpr int kHeight = 120;
+    constexpr int kHorizon = 70;
+    const test::OwnedLuma texture = test::textured_image(kWidth + 8, kHeight, 3);
+    const test::OwnedLuma noise[2] = {test::noise_image(kWidth, kHeight, 4, 193, 207),
+                                      test::noise_image(kWidth, kHeight, 5, 193, 207)};
+    test::OwnedLuma left(kWidth, kHeight);
+    test::OwnedLuma right(kWidth, kHeight);
+    left.fill([&](int x, int y) { return y < kHorizon ? noise[0].at(x, y) : texture.at(x, y); });
+    right.fill([&](int x, int y) { return y < kHorizon ? noise[1].at(x, y) : texture.at(x + 8, y); });
+    for (const MatcherKind kind : {MatcherKind::kCensus, MatcherKind::kCensusPyramid}) {
+        MatcherConfig config;
+        config.kind = kind;
+        config.disparities = 64;
+        const auto answers = [&](int first, int last) {
+            const OwnedResult result = match_fast(config, left.view(), right.view());
+            int count = 0;
+            for (int y = first; y < last; ++y)
+                for (int x = 64; x < kWidth; ++x)
+                    count += result.reason(x, y) == Invalid::kNone ? 1 : 0;
+            return count;
+        };
+        EXPECT_EQ(answers(0, kHorizon - 8), 0);
+        EXPECT_GT(answers(kHorizon + 8, kHeight), (kHeight - kHorizon - 8) * (kWidth - 64) * 9 / 10);
+        config.limits.alike_percent = 0;
+        EXPECT_GT(answers(0, kHorizon - 8), 1000);
+    }
 }
 
 // Sorting all valid neighbours, from a copy of the map.
