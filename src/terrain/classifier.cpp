@@ -15,7 +15,22 @@ namespace {
 constexpr int kBits = 16;  // of the limits' fraction, beside sixteenths: a millionth of a pixel
 // |ground disparity| anywhere in the picture; beyond 1000 px a step over 64 columns would overflow.
 constexpr double kLargestPx = 1000.0;
+constexpr double kOne = static_cast<double>(std::int32_t{1} << kBits) * kDisparityOne;
+// Beyond the certified range nothing is level or a drop, at infinity or behind it nothing at all.
+constexpr kernels::Limit kNothing = {std::numeric_limits<std::int32_t>::min(),
+                                     std::numeric_limits<std::int32_t>::max() - 1};
 constexpr double kLeastPx = 1.0;  // class 1 needs a disparity to speak of: as in the fit of the ground
+
+// floor(value + 0.5) of what fits 32 bits, without a call of the library.
+std::int32_t nearest(double value) {
+    const auto towards_zero = static_cast<std::int32_t>(value + 0.5);
+    return towards_zero - (towards_zero > value + 0.5 ? 1 : 0);
+}
+
+std::int32_t limit_q20(double px) {
+    constexpr double kMost = 2147483000.0;
+    return nearest(std::clamp(px * kOne, -kMost, kMost));
+}
 
 }  // namespace
 
@@ -41,8 +56,8 @@ Classifier::Classifier(const TerrainConfig& config, const RectifiedRig& rig, int
       bands_((rig.width + kernels::kClassColumns - 1) / kernels::kClassColumns),
       table_(static_cast<std::size_t>(disparities) * kDisparityOne + 1),
       certified_q4_(arena.take<std::int32_t>(static_cast<std::size_t>(bands_) * kernels::kClassColumns)),
-      up_q20_(arena.take<std::int32_t>(static_cast<std::size_t>(bands_) * 2 * table_)),
-      down_q20_(arena.take<std::int32_t>(up_q20_.size())),
+      limits_(arena.take<kernels::Limit>(static_cast<std::size_t>(bands_) * 2 * table_)),
+      within_(arena.take<kernels::Limit>(table_)),
       even_(arena.take<kernels::EvenLimits>(static_cast<std::size_t>(bands_))),
       is_even_(arena.take<bool>(static_cast<std::size_t>(bands_))) {
     static_assert(kernels::kClassColumns == GroundSurface::kBandColumns);
@@ -123,8 +138,7 @@ double Classifier::certify_columns(const Wedge& wedge) {
 bool Classifier::even_limits(const Wedge& wedge, GroundUse use, const GroundSurface& surface, int band,
                              double uncertain_px, kernels::EvenLimits& limits) const {
     constexpr double kMost = 2e9;
-    constexpr double kFactorOne = 65536.0;
-    constexpr double kOne = kFactorOne * kDisparityOne;
+    constexpr double kFactorOne = 1 << kBits;
     const double up = 1.0 - wedge.ratio_up;
     const double down = 1.0 + wedge.ratio_down;
     const double most_px = std::max(std::fabs(last_disparity_ + 1.0), std::fabs(first_q4_ / 16.0));
@@ -136,24 +150,36 @@ bool Classifier::even_limits(const Wedge& wedge, GroundUse use, const GroundSurf
         return false;
     for (int step = 0; step < surface.steps() && use == GroundUse::kOwn; ++step)
         if (surface.support(step, band) == CellSupport::kContradicted) return false;
-    const auto fixed = [](double value) { return static_cast<std::int32_t>(std::floor(value + 0.5)); };
-    limits.up_q16 = fixed(up * kFactorOne);
-    limits.down_q16 = fixed(down * kFactorOne);
-    limits.up_off_q20 = fixed(wedge.offset_px * kOne * up);
-    limits.down_off_q20 = fixed(wedge.offset_px * kOne * down);
-    limits.offset_q20 = fixed(wedge.offset_px * kOne);
-    limits.uncertain_q20 = fixed(uncertain_px * kOne);
+    limits.up_q16 = nearest(up * kFactorOne);
+    limits.down_q16 = nearest(down * kFactorOne);
+    limits.up_off_q20 = nearest(wedge.offset_px * kOne * up);
+    limits.down_off_q20 = nearest(wedge.offset_px * kOne * down);
+    limits.offset_q20 = nearest(wedge.offset_px * kOne);
+    limits.uncertain_q20 = nearest(uncertain_px * kOne);
     limits.level = use == GroundUse::kOwn;
     return true;
 }
 
+// Limits within the certified range: but for the level bit those of every band.
+void Classifier::make_within(const Wedge& wedge, GroundUse use, const GroundSurface& surface) {
+    for (std::size_t i = 0; i < table_; ++i) {
+        const int measured_q4 = first_q4_ + static_cast<int>(i);
+        const double px = measured_q4 * (1.0 / kDisparityOne) - wedge.offset_px;
+        const double rise = use == GroundUse::kHeld ? 0.0 : surface.rise(measured_q4);
+        within_[i] = kNothing;
+        if (px <= 0.0) continue;
+        if (wedge.band)
+            within_[i] = {limit_q20(px - wedge.band_px), limit_q20(px + wedge.band_px)};
+        else
+            within_[i] = {limit_q20(px * (1.0 - wedge.ratio_up - rise)),
+                          limit_q20(px * (1.0 + wedge.ratio_down - rise))};
+        within_[i].down_q20 &= ~std::int32_t{1};
+    }
+}
+
 // Limits on the ground's disparity by a pixel's own, for the columns of each band.
 void Classifier::make_limits(const Wedge& wedge, GroundUse use, const GroundSurface& surface) {
-    constexpr double kOne = static_cast<double>(std::int32_t{1} << kBits) * kDisparityOne;
-    constexpr double kMost = 2147483000.0;
-    const auto limit = [&](double px) {
-        return static_cast<std::int32_t>(std::floor(std::clamp(px * kOne, -kMost, kMost) + 0.5));
-    };
+    bool has_within = false;
     const double noise = config_.sigma_disparity_px * config_.sigma_disparity_px;
     for (int band = 0; band < bands_; ++band) {
         // The ground's disparity is least certain at one of the corners.
@@ -174,38 +200,25 @@ void Classifier::make_limits(const Wedge& wedge, GroundUse use, const GroundSurf
             continue;
         }
         is_even_[static_cast<std::size_t>(band)] = false;
-        const std::size_t first = static_cast<std::size_t>(band) * 2 * table_;
+        if (!has_within) make_within(wedge, use, surface);
+        has_within = true;
+        kernels::Limit* const within = &limits_[static_cast<std::size_t>(band) * 2 * table_];
+        kernels::Limit* const beyond = within + table_;
         for (std::size_t i = 0; i < table_; ++i) {
             const int measured_q4 = first_q4_ + static_cast<int>(i);
             const double px = measured_q4 * (1.0 / kDisparityOne) - wedge.offset_px;
-            const double rise = use == GroundUse::kHeld ? 0.0 : surface.rise(measured_q4);
-            std::int32_t& up = up_q20_[first + i];
-            std::int32_t& down = down_q20_[first + i];
-            std::int32_t& up_beyond = up_q20_[first + table_ + i];
-            std::int32_t& down_beyond = down_q20_[first + table_ + i];
-            // Beyond the certified range nothing is level or a drop, at infinity or behind it nothing at all.
-            down_beyond = std::numeric_limits<std::int32_t>::max() - 1;
-            up_beyond = std::numeric_limits<std::int32_t>::min();
-            up = up_beyond;
-            down = down_beyond;
+            within[i] = within_[i];
+            beyond[i] = kNothing;
             if (px <= 0.0) continue;
-            if (wedge.band) {
-                up = limit(px - wedge.band_px);
-                down = limit(px + wedge.band_px);
-            } else {
-                up = limit(px * (1.0 - wedge.ratio_up - rise));
-                down = limit(px * (1.0 + wedge.ratio_down - rise));
-                up_beyond = limit(px * (1.0 - std::max(wedge.ratio_up, uncertain_px / px) - rise));
+            if (!wedge.band) {
+                const double rise = use == GroundUse::kHeld ? 0.0 : surface.rise(measured_q4);
+                beyond[i].up_q20 = limit_q20(px * (1.0 - std::max(wedge.ratio_up, uncertain_px / px) - rise));
             }
-            bool level = px >= kLeastPx || !wedge.band;
-            if (use == GroundUse::kOwn || use == GroundUse::kWeak) {
-                const CellSupport support = surface.support(surface.step_of(measured_q4), band);
-                level = level && (use == GroundUse::kOwn ? support != CellSupport::kContradicted
-                                                         : support == CellSupport::kSupported);
-            } else {
-                level = false;
-            }
-            down = (down & ~std::int32_t{1}) | (level ? 1 : 0);
+            if (use == GroundUse::kHeld || (wedge.band && px < kLeastPx)) continue;
+            const CellSupport support = surface.support(surface.step_of(measured_q4), band);
+            const bool level = use == GroundUse::kOwn ? support != CellSupport::kContradicted
+                                                      : support == CellSupport::kSupported;
+            within[i].down_q20 |= level ? 1 : 0;
         }
     }
 }
@@ -213,8 +226,7 @@ void Classifier::make_limits(const Wedge& wedge, GroundUse use, const GroundSurf
 void Classifier::classify_row(ConstDisparityMap map, const Wedge& wedge, int v, Mask out) const {
     kernels::ClassRow row{};
     row.first_q4 = first_q4_;
-    constexpr double kOne = static_cast<double>(std::int32_t{1} << kBits) * kDisparityOne;
-    row.ground_step_q20 = static_cast<std::int32_t>(std::floor(wedge.ground.du * kOne + 0.5));
+    row.ground_step_q20 = nearest(wedge.ground.du * kOne);
     row.last_q20 = static_cast<std::int32_t>((last_disparity_ - 1 - wedge.offset_px) * kOne);
     for (int band = 0; band < bands_; ++band) {
         const int u = band * kernels::kClassColumns;
@@ -223,15 +235,14 @@ void Classifier::classify_row(ConstDisparityMap map, const Wedge& wedge, int v, 
         row.certified_q4 = &certified_q4_[static_cast<std::size_t>(u)];
         // Anew for each band, so that the rounding of a step adds up over its columns alone.
         const double ground = std::clamp(wedge.ground.at(u, v), -kLargestPx, kLargestPx);
-        row.ground_q20 = static_cast<std::int32_t>(std::floor(ground * kOne + 0.5));
+        row.ground_q20 = nearest(ground * kOne);
         row.count = std::min(kernels::kClassColumns, map.width() - u);
         if (is_even_[static_cast<std::size_t>(band)]) {
             kernels::classify_columns(row, even_[static_cast<std::size_t>(band)], out.row(v) + u);
             continue;
         }
         const std::size_t first = static_cast<std::size_t>(band) * 2 * table_;
-        kernels::classify_columns(
-            row, {&up_q20_[first], &down_q20_[first], static_cast<std::int32_t>(table_)}, out.row(v) + u);
+        kernels::classify_columns(row, {&limits_[first], static_cast<std::int32_t>(table_)}, out.row(v) + u);
     }
 }
 

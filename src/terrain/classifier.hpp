@@ -60,6 +60,7 @@ class Classifier {
     double certify_columns(const Wedge& wedge);
     bool even_limits(const Wedge& wedge, GroundUse use, const GroundSurface& surface, int band,
                      double uncertain_px, kernels::EvenLimits& limits) const;
+    void make_within(const Wedge& wedge, GroundUse use, const GroundSurface& surface);
     void make_limits(const Wedge& wedge, GroundUse use, const GroundSurface& surface);
     void classify_row(ConstDisparityMap map, const Wedge& wedge, int v, Mask out) const;
 
@@ -71,10 +72,10 @@ class Classifier {
     int bands_;
     std::size_t table_;                     // entries of one table of limits
     std::span<std::int32_t> certified_q4_;  // per column, the least measured disparity within its range
-    std::span<std::int32_t> up_q20_;        // [band][within, beyond][disparity]
-    std::span<std::int32_t> down_q20_;
-    std::span<kernels::EvenLimits> even_;  // [band]
-    std::span<bool> is_even_;              // [band]
+    std::span<kernels::Limit> limits_;      // [band][within, beyond][disparity]
+    std::span<kernels::Limit> within_;      // [disparity], of every band but for the level bit
+    std::span<kernels::EvenLimits> even_;   // [band]
+    std::span<bool> is_even_;               // [band]
     Components components_;
     Outline outline_;
     FixedVector<Thing, kMaxObstacles> things_;

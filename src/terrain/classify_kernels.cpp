@@ -16,6 +16,7 @@ using V = hn::Vec<D>;
 constexpr int kLanes = static_cast<int>(hn::MaxLanes(D()));
 using D16 = hn::Rebind<std::int16_t, D>;
 using D8 = hn::Rebind<std::uint8_t, D>;
+using D64 = hn::Repartition<std::int64_t, D>;
 
 HWY_INLINE V Class(TerrainClass kind) {
     return hn::Set(D(), static_cast<std::int32_t>(kind));
@@ -25,6 +26,10 @@ void ClassifyAny(const ClassRow& row, const ClassLimits& limits, std::uint8_t* o
     const D d;
     const D16 d16;
     const D8 d8;
+    const D64 d64;
+    const hn::Half<D> half;
+    static_assert(sizeof(Limit) == sizeof(std::int64_t));
+    const auto* const table = reinterpret_cast<const std::int64_t*>(limits.table);
     const auto* const invalid = reinterpret_cast<const std::uint8_t*>(row.invalid);
     const V step = hn::Set(d, row.ground_step_q20 * kLanes);
     V ground = hn::Add(hn::Set(d, row.ground_q20), hn::Mul(hn::Iota(d, 0), hn::Set(d, row.ground_step_q20)));
@@ -40,8 +45,13 @@ void ClassifyAny(const ClassRow& row, const ClassLimits& limits, std::uint8_t* o
         const auto beyond = hn::Lt(disparity, hn::LoadU(d, row.certified_q4 + u));
         V index = hn::Min(hn::Max(hn::Sub(disparity, first), hn::Zero(d)), last_index);
         index = hn::Add(index, hn::IfThenElseZero(beyond, size));
-        const V up = hn::GatherIndex(d, limits.up_q20, index);
-        const V down = hn::GatherIndex(d, limits.down_q20, index);
+        // Both limits in one look-up of 64 bits: a look-up costs by the element, not by its size.
+        const auto first_half = hn::PromoteTo(d64, hn::LowerHalf(index));
+        const auto second_half = hn::PromoteTo(d64, hn::UpperHalf(half, index));
+        const V low = hn::BitCast(d, hn::GatherIndex(d64, table, first_half));
+        const V high = hn::BitCast(d, hn::GatherIndex(d64, table, second_half));
+        const V up = hn::ConcatEven(d, high, low);
+        const V down = hn::ConcatOdd(d, high, low);
         V kind = hn::And(down, one);  // kTraversable is 1
         kind = hn::IfThenElseZero(hn::Gt(ground, hn::Zero(d)), kind);
         kind = hn::IfThenElse(hn::Gt(ground, down), Class(TerrainClass::kDrop), kind);
@@ -144,11 +154,12 @@ void classify_columns_plain(const ClassRow& row, const ClassLimits& limits, Terr
         const std::int32_t disparity = row.disparity_q4[u];
         const std::int32_t index = std::clamp(disparity - row.first_q4, 0, limits.size - 1) +
                                    (disparity < row.certified_q4[u] ? limits.size : 0);
-        const bool level = (limits.down_q20[index] & 1) != 0 && ground > 0;
-        out[u] = ground < limits.up_q20[index]     ? TerrainClass::kObstacle
-                 : ground > limits.down_q20[index] ? TerrainClass::kDrop
-                 : level                           ? TerrainClass::kTraversable
-                                                   : TerrainClass::kUnknown;
+        const Limit& limit = limits.table[index];
+        const bool level = (limit.down_q20 & 1) != 0 && ground > 0;
+        out[u] = ground < limit.up_q20     ? TerrainClass::kObstacle
+                 : ground > limit.down_q20 ? TerrainClass::kDrop
+                 : level                   ? TerrainClass::kTraversable
+                                           : TerrainClass::kUnknown;
     }
 }
 

@@ -14,9 +14,12 @@ inline constexpr int kClassColumns = 64;
 // Ground disparities are true and in 1/16 px with 16 fractional bits ("q20"), so that 4096 px fit 32 bits.
 // Tables are by measured disparity in 1/16 px from first_q4 on; `size` entries for what lies within the
 // certified range of its column, then as many for what lies beyond.
+struct Limit {
+    std::int32_t up_q20;    // obstacle where the ground's disparity is below
+    std::int32_t down_q20;  // drop where it is above; its last bit says that level ground is class 1
+};
 struct ClassLimits {
-    const std::int32_t* up_q20;    // obstacle where the ground's disparity is below
-    const std::int32_t* down_q20;  // drop where it is above; its last bit says that level ground is class 1
+    const Limit* table;
     std::int32_t size;
 };
 

@@ -332,21 +332,21 @@ void Components::list(const ThingRules& rules, Mask mask, FixedVector<Thing, kMa
     const double first_px = static_cast<double>(first_q4_) / kDisparityOne;
     for (std::size_t i = 0; i < things.size(); ++i) {
         const std::uint32_t* bins = &histograms_[i * static_cast<std::size_t>(bins_) * kWays];
-        // Middle of the bin that holds the pixel of this rank, counted from the nearest.
+        // Middle of the bin that holds the pixel of this rank, counted from the nearest; ranks rise.
+        std::int64_t seen = 0;
+        int bin = bins_;
         const auto disparity_at = [&](std::int64_t rank) {
-            std::int64_t seen = 0;
-            int bin = bins_ - 1;
-            for (; bin > 0; --bin) {
+            while (seen < rank && bin > 0) {
+                --bin;
                 for (std::size_t way = 0; way < kWays; ++way)
                     seen += bins[static_cast<std::size_t>(bin) * kWays + way];
-                if (seen >= rank) break;
             }
             constexpr int kStepsPerBin = kDisparityOne / kBinsPerPx;
             return first_px + (bin + 0.5 - 0.5 / kStepsPerBin) / kBinsPerPx;
         };
         const std::int64_t pixels = things[i].pixels;
-        things[i].median_px = disparity_at((pixels + 1) / 2);
         things[i].near_px = disparity_at(std::min((pixels + 9) / 10, kNearPixels)) - rules.offset_px;
+        things[i].median_px = disparity_at((pixels + 1) / 2);
     }
     // A total order, so that sorting needs no stability (std::stable_sort allocates).
     std::sort(things.begin(), things.end(), [](const Thing& one, const Thing& other) {

@@ -252,10 +252,9 @@ void GroundFinder::tally(ConstDisparityMap map, const DisparityPlane& plane, Par
                     continue;
                 }
                 row.near += size <= kNearPx ? 1 : 0;
-                if (size <= kInlierPx) {
-                    ++row.inliers;
-                    row.square += residual * residual;
-                }
+                const bool inlier = size <= kInlierPx;
+                row.inliers += inlier ? 1 : 0;
+                row.square += inlier ? residual * residual : 0.0;
                 const double t = residual / most;
                 const double weight = (1.0 - t * t) * (1.0 - t * t);
                 row.weight += weight;

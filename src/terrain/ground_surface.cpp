@@ -24,11 +24,6 @@ constexpr double kWorthwhile = 1.10;
 
 }  // namespace
 
-std::size_t GroundSurface::index_of(int disparity_q4) const {
-    const int last = static_cast<int>(step_of_q4_.size()) - 1;
-    return static_cast<std::size_t>(std::clamp(disparity_q4 - first_q4_, 0, last));
-}
-
 void GroundSurface::take(Arena& arena, int width, int /*height*/, int min_disparity, int disparities) {
     width_ = width;
     bands_ = (width + kBandColumns - 1) / kBandColumns;
@@ -41,8 +36,7 @@ void GroundSurface::take(Arena& arena, int width, int /*height*/, int min_dispar
     steps_ = fine * kStepsPerPx + (disparities - fine) + 1;
     const auto steps = static_cast<std::size_t>(steps_);
     range_ = arena.take<double>(steps);
-    counts_ = arena.take<std::uint16_t>(steps * bands * kHeights);
-    totals_ = arena.take<std::uint16_t>(steps * bands);
+    counts_ = arena.take<std::uint16_t>(steps * bands * kCounts);
     pooled_ = arena.take<std::int32_t>(steps * kHeights);
     best_ = arena.take<std::int32_t>(steps * kHeights);
     from_ = arena.take<std::int8_t>(steps * kHeights);
@@ -70,7 +64,6 @@ void GroundSurface::count(ConstDisparityMap map, const DisparityPlane& plane, do
                           double tolerance) {
     height_bin_ = tolerance / kBinsPerTolerance;
     std::fill(counts_.begin(), counts_.end(), std::uint16_t{0});
-    std::fill(totals_.begin(), totals_.end(), std::uint16_t{0});
     for (std::size_t i = 0; i < inverse_px_.size(); ++i) {
         const double true_px = (first_q4_ + static_cast<double>(i)) * (1.0 / kDisparityOne) - offset_px;
         inverse_px_[i] = 1.0 / std::max(true_px, 1.0 / kDisparityOne);
@@ -88,9 +81,9 @@ void GroundSurface::count(ConstDisparityMap map, const DisparityPlane& plane, do
             if (ground < kLeastPx) continue;
             const std::size_t index = index_of(disparity[u]);
             const std::size_t at = cell(step_of_q4_[index], u / kBandColumns);
-            ++totals_[at];
             const double bin = (1.0 - ground * inverse_px_[index]) * per_bin + zero;
-            if (bin >= 0.0 && bin < kHeights) ++counts_[at * kHeights + static_cast<std::size_t>(bin)];
+            const int height = bin >= 0.0 && bin < kHeights ? static_cast<int>(bin) : kBeyond;
+            ++counts_[at * kCounts + static_cast<std::size_t>(height)];
         }
     }
 }
@@ -106,7 +99,7 @@ bool GroundSurface::trace_profile(double per_row_px) {
         for (std::size_t j = 0; j < kHeights; ++j) {
             std::int32_t sum = 0;
             for (std::size_t band = 0; band < static_cast<std::size_t>(bands_); ++band)
-                sum += counts_[(step * static_cast<std::size_t>(bands_) + band) * kHeights + j];
+                sum += counts_[(step * static_cast<std::size_t>(bands_) + band) * kCounts + j];
             pooled_[step * kHeights + j] = sum;
         }
     std::int64_t on_plane = 0;
@@ -243,14 +236,14 @@ void GroundSurface::judge_cells() {
         const int level = kZero + static_cast<int>(std::floor(height + 0.5));
         for (int band = 0; band < bands_; ++band) {
             const std::size_t at = cell(step, band);
-            const std::uint16_t* counts = &counts_[at * kHeights];
+            const std::uint16_t* counts = &counts_[at * kCounts];
             int near = 0;
             int about = 0;
             for (int j = 0; j < kHeights; ++j) {
                 about += counts[j];
                 near += std::abs(j - level) <= 3 ? counts[j] : 0;
             }
-            const bool supported = near >= 3 && 10 * near >= totals_[at];
+            const bool supported = near >= 3 && 10 * near >= about + counts[kBeyond];
             const bool elsewhere = about >= 12 && 10 * near < about;
             support_[at] = supported   ? CellSupport::kSupported
                            : elsewhere ? CellSupport::kContradicted

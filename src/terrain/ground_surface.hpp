@@ -1,6 +1,7 @@
 // The ground's shape about its plane: its heights and depths along the way, as far as pixels show them.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 
@@ -60,9 +61,14 @@ class GroundSurface {
   private:
     static constexpr int kHeights = 48;  // bins of a sixth of the tolerance
     static constexpr int kZero = kHeights / 2;
+    static constexpr int kBeyond = kHeights;  // pixels of any other height
+    static constexpr int kCounts = kHeights + 1;
 
     std::size_t cell(int step, int band) const { return static_cast<std::size_t>(step * bands_ + band); }
-    std::size_t index_of(int disparity_q4) const;
+    std::size_t index_of(int disparity_q4) const {
+        const int last = static_cast<int>(step_of_q4_.size()) - 1;
+        return static_cast<std::size_t>(std::clamp(disparity_q4 - first_q4_, 0, last));
+    }
     void count(ConstDisparityMap map, const DisparityPlane& plane, double offset_px, double tolerance);
     bool trace_profile(double per_row_px);
     void cut_behind_lip(double per_row_px);
@@ -80,8 +86,7 @@ class GroundSurface {
     std::span<std::uint16_t> step_of_q4_;
     std::span<double> inverse_px_;     // 1 / true disparity by measured disparity
     std::span<double> range_;          // of each step
-    std::span<std::uint16_t> counts_;  // [step][band][height]
-    std::span<std::uint16_t> totals_;  // [step][band], of any height
+    std::span<std::uint16_t> counts_;  // [step][band][height, kBeyond]
     std::span<std::int32_t> pooled_;   // [step][height]
     std::span<std::int32_t> best_;     // [step][height] of the path so far
     std::span<std::int8_t> from_;      // [step][height] where it came from, in height bins

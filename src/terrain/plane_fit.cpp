@@ -48,16 +48,30 @@ void PlaneFit::Set::take(Arena& arena, std::size_t most) {
     d_px = arena.take<float>(most);
 }
 
-void PlaneFit::Set::add(int u_px, int v_px, float disparity_px) {
-    u[used] = static_cast<float>(u_px);
-    v[used] = static_cast<float>(v_px);
-    d_px[used++] = disparity_px;
-}
+// Written always, kept where valid: a branch on what the matching left out would be guessed wrongly too
+// often.
+class PlaneFit::Set::Writer {
+  public:
+    explicit Writer(Set& set) : set_(set), u_(set.u.data()), v_(set.v.data()), d_px_(set.d_px.data()) {}
+    void add(int u_px, int v_px, float disparity_px, bool valid) {
+        u_[used_] = static_cast<float>(u_px);
+        v_[used_] = static_cast<float>(v_px);
+        d_px_[used_] = disparity_px;
+        used_ += valid ? 1U : 0U;
+    }
+    void fill_up() {
+        while (used_ % kernels::kSampleLanes != 0)
+            add(0, 0, kernels::kNoSample, true);
+        set_.used = used_;
+    }
 
-void PlaneFit::Set::fill_up() {
-    while (used % kernels::kSampleLanes != 0)
-        add(0, 0, kernels::kNoSample);
-}
+  private:
+    Set& set_;
+    float* u_;
+    float* v_;
+    float* d_px_;
+    std::size_t used_ = 0;
+};
 
 kernels::Samples PlaneFit::Set::samples(std::size_t first, std::size_t count) const {
     return {u.data() + first, v.data() + first, d_px.data() + first, count};
@@ -90,28 +104,25 @@ void PlaneFit::take(Arena& arena, int width, int height) {
 
 void PlaneFit::sample(ConstDisparityMap map, double offset_px) {
     offset_px_ = offset_px;
-    rough_.used = thin_.used = dense_.used = 0;
     // Coordinates from the middle, where floats of the sums lose least.
     const int middle_u = middle_u_;
     const int middle_v = middle_v_;
-    const auto each = [&](int first, int step_u, int step_v, auto put) {
+    const auto each = [&](int first, int step_u, int step_v, Set& set) {
+        Set::Writer writer(set);
         for (int v = first; v < height_; v += step_v) {
             const std::int16_t* disparity = map.disparity_q4.row(v);
             const Invalid* invalid = map.invalid.row(v);
             for (int u = first; u < width_; u += step_u)
-                if (invalid[u] == Invalid::kNone)
-                    put(u, v, static_cast<float>(disparity[u]) * (1.0F / kDisparityOne));
+                writer.add(u - middle_u, v - middle_v,
+                           static_cast<float>(disparity[u]) * (1.0F / kDisparityOne),
+                           invalid[u] == Invalid::kNone);
         }
+        writer.fill_up();
     };
-    each(thin_step_ / 2, thin_step_, thin_step_, [&](int u, int v, float d_px) {
-        thin_.add(u - middle_u, v - middle_v, d_px);
-        if (u / thin_step_ % 2 == 0 && v / thin_step_ % 2 == 0) rough_.add(u - middle_u, v - middle_v, d_px);
-    });
-    each(0, step_u_, step_v_,
-         [&](int u, int v, float d_px) { dense_.add(u - middle_u, v - middle_v, d_px); });
-    rough_.fill_up();
-    thin_.fill_up();
-    dense_.fill_up();
+    const int first = thin_step_ / 2;
+    each(first, thin_step_, thin_step_, thin_);
+    each(first, 2 * thin_step_, 2 * thin_step_, rough_);
+    each(0, step_u_, step_v_, dense_);
 }
 
 DisparityPlane PlaneFit::centred(const DisparityPlane& plane) const {

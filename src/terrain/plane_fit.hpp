@@ -52,8 +52,7 @@ class PlaneFit {
         std::span<float> u, v, d_px;
         std::size_t used = 0;
         void take(Arena& arena, std::size_t most);
-        void add(int u_px, int v_px, float disparity_px);
-        void fill_up();
+        class Writer;
         kernels::Samples samples(std::size_t first, std::size_t count) const;
         kernels::Samples all() const { return samples(0, used); }
     };

@@ -19,8 +19,7 @@ using test::Dice;
 TEST(ClassifyKernel, EqualsItsPlainStatementOnEveryUnit) {
     constexpr int kSize = 16 * 64 + 1;
     Dice dice(17);
-    std::vector<std::int32_t> up(2 * kSize);
-    std::vector<std::int32_t> down(2 * kSize);
+    std::vector<Limit> table(2 * kSize);
     std::vector<std::int16_t> disparity(kClassColumns + 16);
     std::vector<Invalid> invalid(kClassColumns + 16);
     std::vector<std::int32_t> certified(kClassColumns + 16);
@@ -34,9 +33,10 @@ TEST(ClassifyKernel, EqualsItsPlainStatementOnEveryUnit) {
             row.ground_step_q20 = static_cast<std::int32_t>(dice.between(-0.2, 0.2) * 16 * 65536);
             row.last_q20 = static_cast<std::int32_t>(dice.between(0.0, 40.0) * 16 * 65536);
             row.count = trial % 3 == 0 ? kClassColumns : 1 + static_cast<int>(dice.bits() % kClassColumns);
-            for (std::size_t i = 0; i < up.size(); ++i) {
-                up[i] = static_cast<std::int32_t>(dice.between(-4.0, 40.0) * 16 * 65536);
-                down[i] = up[i] + static_cast<std::int32_t>(dice.between(0.0, 20.0) * 16 * 65536);
+            for (Limit& limit : table) {
+                limit.up_q20 = static_cast<std::int32_t>(dice.between(-4.0, 40.0) * 16 * 65536);
+                limit.down_q20 =
+                    limit.up_q20 + static_cast<std::int32_t>(dice.between(0.0, 20.0) * 16 * 65536);
             }
             for (std::size_t u = 0; u < disparity.size(); ++u) {
                 disparity[u] =
@@ -50,7 +50,7 @@ TEST(ClassifyKernel, EqualsItsPlainStatementOnEveryUnit) {
             row.disparity_q4 = disparity.data();
             row.invalid = invalid.data();
             row.certified_q4 = certified.data();
-            const ClassLimits limits{up.data(), down.data(), kSize};
+            const ClassLimits limits{table.data(), kSize};
             std::vector<TerrainClass> plain(kClassColumns + 16);
             std::vector<TerrainClass> fast(kClassColumns + 16);
             classify_columns_plain(row, limits, plain.data());
