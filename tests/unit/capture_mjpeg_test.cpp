@@ -4,26 +4,18 @@
 #include <gtest/gtest.h>
 
 #include <cstdio>
-// clang-format off
-#include <jpeglib.h>
-// clang-format on
 
 #include <cmath>
 #include <cstdlib>
 #include <vector>
 
 #include "support/allocation_count.hpp"
+#include "unit/jpeg_support.hpp"
 
 namespace groundline::capture {
 namespace {
 
-struct Picture {
-    Picture(int w, int h) : width(w), height(h), memory(static_cast<std::size_t>(w * h)) {}
-    Luma view() { return {memory.data(), width, height, width}; }
-    int width;
-    int height;
-    std::vector<std::uint8_t> memory;
-};
+using namespace test;
 
 Picture slope(int width, int height) {
     Picture picture(width, height);
@@ -33,53 +25,6 @@ Picture slope(int width, int height) {
                 static_cast<std::uint8_t>(60 + 100 * x / width + 80 * y / height + (x / 8 + y / 8) % 2 * 10);
     return picture;
 }
-
-using Jpeg = std::vector<std::uint8_t>;
-
-// How a colour picture's chroma is sampled against its luma.
-struct Sampling {
-    int components;
-    int horizontal;
-    int vertical;
-};
-
-// Colour is far from grey, so that a decoder that took it for luma would show. `restart` as in
-// jpeg_compress_struct.
-Jpeg compress(Picture& picture, Sampling sampling, unsigned restart = 0) {
-    jpeg_compress_struct encoder{};
-    jpeg_error_mgr errors{};
-    encoder.err = jpeg_std_error(&errors);
-    jpeg_create_compress(&encoder);
-    unsigned char* bytes = nullptr;
-    unsigned long size = 0;
-    jpeg_mem_dest(&encoder, &bytes, &size);
-    encoder.image_width = static_cast<unsigned>(picture.width);
-    encoder.image_height = static_cast<unsigned>(picture.height);
-    encoder.input_components = sampling.components;
-    encoder.in_color_space = sampling.components == 1 ? JCS_GRAYSCALE : JCS_YCbCr;
-    jpeg_set_defaults(&encoder);
-    jpeg_set_quality(&encoder, 95, TRUE);
-    encoder.comp_info[0].h_samp_factor = sampling.horizontal;
-    encoder.comp_info[0].v_samp_factor = sampling.vertical;
-    encoder.restart_interval = restart;
-    jpeg_start_compress(&encoder, TRUE);
-    std::vector<std::uint8_t> pixels(static_cast<std::size_t>(picture.width * sampling.components), 200);
-    for (int y = 0; y < picture.height; ++y) {
-        for (int x = 0; x < picture.width; ++x)
-            pixels[static_cast<std::size_t>(x * sampling.components)] = picture.view().at(x, y);
-        JSAMPROW row = pixels.data();
-        jpeg_write_scanlines(&encoder, &row, 1);
-    }
-    jpeg_finish_compress(&encoder);
-    jpeg_destroy_compress(&encoder);
-    Jpeg jpeg(bytes, bytes + size);
-    std::free(bytes);
-    return jpeg;
-}
-
-constexpr Sampling kGrey{1, 1, 1};
-constexpr Sampling k422{3, 2, 1};
-constexpr Sampling k420{3, 2, 2};
 
 double mean_difference(const Picture& a, const Picture& b) {
     double sum = 0.0;
@@ -203,9 +148,9 @@ TEST(Mjpeg, TheLibraryTakesTheSameFewBlocksForEveryPicture) {
     std::vector<std::uint64_t> blocks;
     blocks.reserve(20);
     for (int i = 0; i < 20; ++i) {
-        const std::uint64_t before = test::allocations();
+        const std::uint64_t before = ::groundline::test::allocations();
         ASSERT_TRUE(decoder.decode(good, decoded.view()));
-        blocks.push_back(test::allocations() - before);
+        blocks.push_back(::groundline::test::allocations() - before);
     }
     for (std::size_t i = 1; i < blocks.size(); ++i)
         EXPECT_EQ(blocks[i], blocks[1]);
