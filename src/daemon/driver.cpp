@@ -22,6 +22,10 @@ std::vector<std::string> parts(const std::string& text) {
 }  // namespace
 
 capture::OpenedSource open_driver(const settings::CaptureSettings& settings) {
+    if (settings.driver == settings::CaptureDriver::kV4l2 ||
+        settings.driver == settings::CaptureDriver::kLibcamera)
+        throw Refusal(ExitStatus::kConfig,
+                      "capture.driver: this program has no cameras; set files or synthetic");
     if (settings.source.empty())
         throw Refusal(ExitStatus::kConfig,
                       "capture.source is not set: name a recording (capture.driver: files) or a scene "
@@ -31,6 +35,8 @@ capture::OpenedSource open_driver(const settings::CaptureSettings& settings) {
             return capture::open_source(parts(settings.source));
         case settings::CaptureDriver::kSynthetic:
             return capture::open_source({"synthetic:" + settings.source});
+        default:
+            break;
     }
     throw Refusal(ExitStatus::kConfig, "capture.driver: there is no such driver in this program");
 }

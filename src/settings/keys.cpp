@@ -100,12 +100,13 @@ Key text(std::string name, std::string range, std::string help, Member member) {
     return key;
 }
 
-// A number that may be left unset; `unset` is its printed and accepted word for that.
+// A number that may be left open; `open` is its printed and accepted word for that.
 template <typename Member>
-Key optional_number(std::string name, double low, double high, std::string help, Member member) {
-    Key key{std::move(name), fmt::format("unset | {} .. {}", low, high), std::move(help)};
+Key optional_number(std::string name, double low, double high, std::string help, Member member,
+                    std::string open = "unset") {
+    Key key{std::move(name), fmt::format("{} | {} .. {}", open, low, high), std::move(help)};
     key.parse = [=](Settings& settings, std::string_view word) {
-        if (word == "unset") {
+        if (word == open) {
             member(settings).reset();
             return true;
         }
@@ -115,7 +116,7 @@ Key optional_number(std::string name, double low, double high, std::string help,
         return true;
     };
     key.print = [=](const Settings& settings) {
-        return member(settings) ? fmt::format("{}", *member(settings)) : std::string("unset");
+        return member(settings) ? fmt::format("{}", *member(settings)) : open;
     };
     return key;
 }
@@ -182,16 +183,34 @@ Key cpus(std::string name, std::string help, Member member) {
     return key;
 }
 
+Key pixel_format_key() {
+    std::vector<std::pair<std::string, std::optional<capture::PixelFormat>>> words = {{"auto", std::nullopt}};
+    for (int i = 0; i < capture::kPixelFormats; ++i) {
+        const auto format = static_cast<capture::PixelFormat>(i);
+        words.emplace_back(std::string(capture::name_of(format)), format);
+    }
+    return choice<std::optional<capture::PixelFormat>>(
+        "capture.format", words,
+        "Cameras: pixel format; auto takes the first of these that gives the size at the rate.",
+        [](auto& settings) -> auto& { return settings.capture.camera.format; });
+}
+
 // Written once for const and mutable settings.
 #define GROUNDLINE_MEMBER(path) ([](auto& settings) -> auto& { return settings.path; })
 
 void add_capture_keys(std::vector<Key>& keys) {
     keys.push_back(choice<CaptureDriver>(
-        "capture.driver", {{"files", CaptureDriver::kFiles}, {"synthetic", CaptureDriver::kSynthetic}},
-        "Daemon: where pairs come from: recordings, or rendered scenes.", GROUNDLINE_MEMBER(capture.driver)));
-    keys.push_back(text("capture.source", "a folder, a video, two pictures with a comma between, or a scene",
-                        "Daemon: what the driver opens, as groundline replay does; a scene is NAME[?seed=N].",
-                        GROUNDLINE_MEMBER(capture.source)));
+        "capture.driver",
+        {{"v4l2", CaptureDriver::kV4l2},
+         {"libcamera", CaptureDriver::kLibcamera},
+         {"files", CaptureDriver::kFiles},
+         {"synthetic", CaptureDriver::kSynthetic}},
+        "Daemon: where pairs come from: cameras through V4L2 or libcamera, recordings, or rendered scenes.",
+        GROUNDLINE_MEMBER(capture.driver)));
+    keys.push_back(
+        text("capture.source", "a folder, a video, two pictures with a comma between, or a scene",
+             "Daemon: what files or synthetic opens, as groundline replay does; a scene is NAME[?seed=N].",
+             GROUNDLINE_MEMBER(capture.source)));
     keys.push_back(text("capture.calibration", "a file, or two with a comma between",
                         "Daemon: calibration of the pair; empty: looked for beside the pictures.",
                         GROUNDLINE_MEMBER(capture.calibration)));
@@ -199,6 +218,54 @@ void add_capture_keys(std::vector<Key>& keys) {
                           "Daemon: recorded and rendered pairs begin again at their end; off, the program "
                           "ends with them.",
                           GROUNDLINE_MEMBER(capture.loop)));
+
+    using capture::Flip;
+    const std::string names = "/dev/... | videoN | by-id/... | by-path/... | serial:...";
+    keys.push_back(text("capture.device", names,
+                        "Cameras: the one that gives both eyes side by side, left eye on the left.",
+                        GROUNDLINE_MEMBER(capture.camera.device)));
+    keys.push_back(text("capture.left", names,
+                        "Cameras: the left one; by-path names a port, by-id and serial the camera itself.",
+                        GROUNDLINE_MEMBER(capture.camera.left)));
+    keys.push_back(
+        text("capture.right", names, "Cameras: the right one.", GROUNDLINE_MEMBER(capture.camera.right)));
+    keys.push_back(whole("capture.width", 16, 8192,
+                         "Cameras: width of one eye's picture; the calibration must be for this size.",
+                         GROUNDLINE_MEMBER(capture.camera.width)));
+    keys.push_back(
+        whole("capture.height", 16, 8192, "Cameras: its height.", GROUNDLINE_MEMBER(capture.camera.height)));
+    keys.push_back(pixel_format_key());
+    keys.push_back(number("capture.rate_hz", 0.1, 1000.0,
+                          "Cameras: pictures a second; the nearest that the camera has is taken.",
+                          GROUNDLINE_MEMBER(capture.camera.rate_hz)));
+    keys.push_back(optional_number("capture.exposure_us", 1.0, 1e6,
+                                   "Cameras: exposure time; auto leaves it to each camera.",
+                                   GROUNDLINE_MEMBER(capture.camera.exposure_us), "auto"));
+    keys.push_back(optional_number("capture.gain", 0.0, 1e6,
+                                   "Cameras: gain in the camera's own units; auto leaves it to each camera.",
+                                   GROUNDLINE_MEMBER(capture.camera.gain), "auto"));
+    keys.push_back(choice<Flip>("capture.flip",
+                                {{"none", Flip::kNone},
+                                 {"horizontal", Flip::kHorizontal},
+                                 {"vertical", Flip::kVertical},
+                                 {"both", Flip::kBoth}},
+                                "Cameras: what each is told to mirror; both is a camera mounted upside down.",
+                                GROUNDLINE_MEMBER(capture.camera.flip)));
+    keys.push_back(
+        on_off("capture.follow_exposure",
+               "Cameras: the right one takes over exposure and gain that the left one says it uses; not "
+               "for cameras whose automatic does not say.",
+               GROUNDLINE_MEMBER(capture.follow_exposure)));
+    keys.push_back(
+        number("capture.pair_tolerance_ms", 0.01, 1000.0,
+               "Cameras: exposures further apart are no pair; beyond 2 ms the verdict is degraded.",
+               GROUNDLINE_MEMBER(capture.pair_tolerance_ms)));
+    keys.push_back(number("capture.start_timeout_s", 0.5, 600.0,
+                          "Cameras: opened again when no picture has come for this long after a start.",
+                          GROUNDLINE_MEMBER(capture.start_timeout_s)));
+    keys.push_back(number("capture.stall_timeout_s", 0.1, 60.0,
+                          "Cameras: opened again when an eye gave no picture for this long.",
+                          GROUNDLINE_MEMBER(capture.stall_timeout_s)));
 }
 
 void add_daemon_keys(std::vector<Key>& keys) {

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "capture/camera_source.hpp"
 #include "core/error.hpp"
 #include "settings/key.hpp"
 
@@ -113,6 +114,32 @@ Reload reload(const Settings& running, const Settings& wanted) {
         (key.reloadable ? result.taken : result.need_restart).push_back(key.name);
     }
     return result;
+}
+
+capture::CameraSourceConfig camera_source_config(const Settings& settings) {
+    const CaptureSettings& live = settings.capture;
+    const capture::CameraSetup& camera = live.camera;
+    if (camera.side_by_side() && (!camera.left.empty() || !camera.right.empty()))
+        refuse(
+            "capture.device is one camera that gives both eyes side by side: set it, or capture.left and "
+            "capture.right, not all of them");
+    if (!camera.side_by_side() && (camera.left.empty() || camera.right.empty()))
+        refuse(
+            "no cameras are named: set capture.left and capture.right, or capture.device for one camera that "
+            "gives both eyes side by side");
+    if (camera.left == camera.right && !camera.side_by_side())
+        refuse(fmt::format("capture.left and capture.right are both '{}': name two cameras", camera.left));
+    capture::CameraSourceConfig config;
+    config.name = camera.side_by_side() ? camera.device : fmt::format("{} and {}", camera.left, camera.right);
+    config.width = camera.width;
+    config.height = camera.height;
+    config.rate_hz = camera.rate_hz;
+    config.side_by_side = camera.side_by_side();
+    config.pairing.tolerance_ns = static_cast<std::int64_t>(live.pair_tolerance_ms * 1e6);
+    config.limits.start_ns = static_cast<std::int64_t>(live.start_timeout_s * 1e9);
+    config.limits.stall_ns = static_cast<std::int64_t>(live.stall_timeout_s * 1e9);
+    config.follow_exposure = live.follow_exposure;
+    return config;
 }
 
 std::vector<std::pair<std::string, std::string>> in_force(const Settings& settings) {

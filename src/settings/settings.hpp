@@ -9,10 +9,15 @@
 #include <utility>
 #include <vector>
 
+#include "capture/camera_setup.hpp"
 #include "stereo/matcher.hpp"
 #include "terrain/config.hpp"
 #include "terrain/elevation_grid.hpp"
 #include "verdict/verdict.hpp"
+
+namespace groundline::capture {
+struct CameraSourceConfig;
+}
 
 namespace groundline::settings {
 
@@ -27,7 +32,7 @@ struct MountSettings {
     std::string body_mask;  // polygons or the path of a picture, see io/body_mask.hpp; empty: none
 };
 
-enum class CaptureDriver : std::uint8_t { kFiles, kSynthetic };
+enum class CaptureDriver : std::uint8_t { kV4l2, kLibcamera, kFiles, kSynthetic };
 
 // Where the daemon's pairs come from; `groundline replay` names its source on the command line.
 struct CaptureSettings {
@@ -35,6 +40,12 @@ struct CaptureSettings {
     std::string source;       // what the driver opens
     std::string calibration;  // one file, or two with a comma between; empty: looked for beside the pictures
     bool loop = true;         // recorded and rendered pairs begin again at their end
+
+    capture::CameraSetup camera;  // of the live drivers, like what follows
+    bool follow_exposure = false;
+    double pair_tolerance_ms = 10.0;
+    double start_timeout_s = 10.0;
+    double stall_timeout_s = 2.0;
 };
 
 // What the daemon asks of the machine.
@@ -85,6 +96,11 @@ void set_word(Settings& settings, std::string_view word);
 // Throws Refusal(kConfig) for half a mount (height without pitch or the other way round).
 terrain::TerrainConfig terrain_config(const Settings& settings);
 verdict::Limits verdict_limits(const Settings& settings);
+
+// What a live source gets (capture/camera_source.hpp); its driver gets settings.capture.camera. Throws
+// Refusal(kConfig) where the cameras are not named: either one device for both eyes, or a left and a right
+// one.
+capture::CameraSourceConfig camera_source_config(const Settings& settings);
 
 // What of `wanted` a running daemon can take over, and what it cannot.
 struct Reload {

@@ -8,6 +8,7 @@
 #include <set>
 #include <sstream>
 
+#include "capture/camera_source.hpp"
 #include "core/edit_distance.hpp"
 #include "core/error.hpp"
 #include "settings/cpu_list.hpp"
@@ -71,6 +72,74 @@ TEST(Keys, ContractNamesAndDefaultsHold) {
     EXPECT_EQ(value("terrain.stopping_distance_m"), "2");
     for (const char* name : {"mount.height_m", "mount.pitch_deg", "mount.roll_deg"})
         EXPECT_EQ(value(name), "unset") << name;
+}
+
+TEST(Cameras, AreSetWordByWord) {
+    Settings settings;
+    const std::vector<std::pair<const char*, const char*>> words = {{"capture.driver", "v4l2"},
+                                                                    {"capture.left", "by-path/a"},
+                                                                    {"capture.right", "serial:B"},
+                                                                    {"capture.width", "1280"},
+                                                                    {"capture.height", "800"},
+                                                                    {"capture.format", "y10p"},
+                                                                    {"capture.rate_hz", "29.97"},
+                                                                    {"capture.exposure_us", "5000"},
+                                                                    {"capture.gain", "12"},
+                                                                    {"capture.flip", "both"},
+                                                                    {"capture.follow_exposure", "on"},
+                                                                    {"capture.pair_tolerance_ms", "4"},
+                                                                    {"capture.start_timeout_s", "7"},
+                                                                    {"capture.stall_timeout_s", "0.5"}};
+    for (const auto& [key, value] : words) {
+        set_word(settings, std::string(key) + "=" + value);
+        EXPECT_EQ(find_key(key)->print(settings), value) << key;
+    }
+    const capture::CameraSetup& camera = settings.capture.camera;
+    EXPECT_EQ(camera.format, capture::PixelFormat::kY10P);
+    EXPECT_EQ(camera.exposure_us, 5000.0);
+    EXPECT_EQ(camera.flip, capture::Flip::kBoth);
+    const capture::CameraSourceConfig config = camera_source_config(settings);
+    EXPECT_EQ(config.name, "by-path/a and serial:B");
+    EXPECT_EQ(config.width, 1280);
+    EXPECT_EQ(config.height, 800);
+    EXPECT_FALSE(config.side_by_side);
+    EXPECT_TRUE(config.follow_exposure);
+    EXPECT_EQ(config.pairing.tolerance_ns, 4'000'000);
+    EXPECT_EQ(config.limits.start_ns, 7'000'000'000);
+    EXPECT_EQ(config.limits.stall_ns, 500'000'000);
+    set_word(settings, "capture.format=auto");
+    set_word(settings, "capture.gain=auto");
+    EXPECT_FALSE(settings.capture.camera.format.has_value());
+    EXPECT_FALSE(settings.capture.camera.gain.has_value());
+    EXPECT_NE(refusal([&] { set_word(settings, "capture.format=rgb"); }, ExitStatus::kConfig).find("nv12"),
+              std::string::npos);
+}
+
+TEST(Cameras, MustBeNamedOneWayOrTheOther) {
+    struct Case {
+        const char* device;
+        const char* left;
+        const char* right;
+        const char* words;  // of the refusal; empty: it is good
+    };
+    for (const Case& c : {Case{"", "a", "b", ""},
+                          {"d", "", "", ""},
+                          {"", "", "", "no cameras are named"},
+                          {"", "a", "", "no cameras are named"},
+                          {"", "a", "a", "name two cameras"},
+                          {"d", "a", "", "not all of them"}}) {
+        Settings settings;
+        settings.capture.camera.device = c.device;
+        settings.capture.camera.left = c.left;
+        settings.capture.camera.right = c.right;
+        if (*c.words == '\0') {
+            EXPECT_EQ(camera_source_config(settings).side_by_side, *c.device != '\0');
+        } else {
+            EXPECT_NE(
+                refusal([&] { (void)camera_source_config(settings); }, ExitStatus::kConfig).find(c.words),
+                std::string::npos);
+        }
+    }
 }
 
 TEST(Words, SetTheValueOrSayWhatWasExpected) {
