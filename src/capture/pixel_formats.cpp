@@ -30,6 +30,12 @@ void four_of_five(const Byte* __restrict source, int count, Byte* __restrict tar
         target[x] = *source++;
 }
 
+template <int kRed, int kBlue>
+void weigh(const Byte* __restrict source, int count, Byte* __restrict target) {
+    for (int x = 0; x < count; ++x)
+        target[x] = luma_of(source[3 * x + kRed], source[3 * x + 1], source[3 * x + kBlue]);
+}
+
 // Bytes from the beginning of a row to the pixel `first`.
 std::size_t offset_of(PixelFormat format, int first) {
     const auto column = static_cast<std::size_t>(first);
@@ -39,6 +45,9 @@ std::size_t offset_of(PixelFormat format, int first) {
             return column;
         case PixelFormat::kY10P:
             return column / 4 * 5;
+        case PixelFormat::kRgb24:
+        case PixelFormat::kBgr24:
+            return 3 * column;
         default:
             return 2 * column;
     }
@@ -100,6 +109,12 @@ bool unpack_luma(const RawPicture& picture, Columns columns, int first_row, Luma
                 break;
             case PixelFormat::kY10P:
                 four_of_five(source, columns.count, target);
+                break;
+            case PixelFormat::kRgb24:
+                weigh<0, 2>(source, columns.count, target);
+                break;
+            case PixelFormat::kBgr24:
+                weigh<2, 0>(source, columns.count, target);
                 break;
             case PixelFormat::kMjpeg:
             case PixelFormat::kCount:

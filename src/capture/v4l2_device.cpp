@@ -18,8 +18,9 @@ constexpr double kNearEnough = 0.9;
 constexpr double kExposureUnitUs = 100.0;  // of V4L2_CID_EXPOSURE_ABSOLUTE
 
 constexpr std::array<std::uint32_t, static_cast<std::size_t>(kPixelFormats)> kFourcc = {
-    V4L2_PIX_FMT_GREY, V4L2_PIX_FMT_NV12, V4L2_PIX_FMT_YUYV, V4L2_PIX_FMT_UYVY, V4L2_PIX_FMT_Y10,
-    V4L2_PIX_FMT_Y10P, V4L2_PIX_FMT_Y12,  V4L2_PIX_FMT_Y16,  V4L2_PIX_FMT_MJPEG};
+    V4L2_PIX_FMT_GREY,  V4L2_PIX_FMT_NV12,  V4L2_PIX_FMT_YUYV, V4L2_PIX_FMT_UYVY,
+    V4L2_PIX_FMT_Y10,   V4L2_PIX_FMT_Y10P,  V4L2_PIX_FMT_Y12,  V4L2_PIX_FMT_Y16,
+    V4L2_PIX_FMT_RGB24, V4L2_PIX_FMT_BGR24, V4L2_PIX_FMT_MJPEG};
 
 std::uint32_t fourcc_of(PixelFormat format) {
     return kFourcc[static_cast<std::size_t>(format)];

@@ -10,9 +10,9 @@
 namespace groundline::capture {
 namespace {
 
-constexpr std::array kUnpacked = {PixelFormat::kGrey, PixelFormat::kNv12, PixelFormat::kYuyv,
-                                  PixelFormat::kUyvy, PixelFormat::kY10,  PixelFormat::kY10P,
-                                  PixelFormat::kY12,  PixelFormat::kY16};
+constexpr std::array kUnpacked = {
+    PixelFormat::kGrey, PixelFormat::kNv12, PixelFormat::kYuyv, PixelFormat::kUyvy,  PixelFormat::kY10,
+    PixelFormat::kY10P, PixelFormat::kY12,  PixelFormat::kY16,  PixelFormat::kRgb24, PixelFormat::kBgr24};
 
 int depth_of(PixelFormat format) {
     switch (format) {
@@ -71,6 +71,13 @@ Packed pack(PixelFormat format, int width, int height, std::size_t padding, std:
         packed.block[i] = static_cast<std::uint8_t>(random());
     for (int y = 0; y < height; ++y) {
         for (int x = 0; x < width; ++x) {
+            if (format == PixelFormat::kRgb24 || format == PixelFormat::kBgr24) {
+                const std::uint8_t* pixel = packed.block.get() + static_cast<std::size_t>(y) * stride + 3 * x;
+                const int first = format == PixelFormat::kRgb24 ? 77 : 29;
+                packed.luma.push_back(static_cast<std::uint8_t>(
+                    (first * pixel[0] + 150 * pixel[1] + (106 - first) * pixel[2] + 128) / 256));
+                continue;
+            }
             const int depth = depth_of(format);
             const unsigned value = static_cast<unsigned>(random()) & ((1U << depth) - 1U);
             put(format, packed.block.get() + static_cast<std::size_t>(y) * stride, x, value,
