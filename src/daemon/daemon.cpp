@@ -12,7 +12,6 @@
 #include <optional>
 #include <thread>
 
-#include "capture/open.hpp"
 #include "core/arena.hpp"
 #include "core/counters.hpp"
 #include "daemon/driver.hpp"
@@ -73,8 +72,8 @@ settings::Settings with_disparities(settings::Settings settings, const SourceInf
 // Everything with its memory, in the order it is needed; nothing moves yet but the workers that wait.
 struct Parts {
     explicit Parts(const settings::Settings& wanted)
-        : opened(open_driver(wanted.capture)),
-          calibration(setup::load_calibration(calibration_files(wanted.capture), opened)),
+        : driver(open_driver(wanted, counters)),
+          calibration(setup::load_calibration(calibration_files(wanted.capture), driver.opened)),
           settings(with_disparities(wanted, info(), calibration)),
           rectifier(calibration ? rig::Rectifier(*calibration, info().width, info().height, arena)
                                 : rig::Rectifier(info().width, info().height)),
@@ -85,7 +84,7 @@ struct Parts {
           publisher(lcm_options(settings, counters, &tracker)),
           health(lcm_options(settings, counters)),
           sinks{{{&publisher, Stage::kPublish, false}}},
-          running(*opened.source, processor, sinks, false, arena, counters) {
+          running(*driver.opened.source, processor, sinks, false, arena, counters) {
         arena.seal();
     }
 
@@ -99,7 +98,7 @@ struct Parts {
         }
         options.on_thread = [this](pipeline::ThreadRole role) {
             // A renderer is no camera: it may take all the time there is, and more.
-            if (role != pipeline::ThreadRole::kCapture || !opened.rig) real_time.adopt(role);
+            if (role != pipeline::ThreadRole::kCapture || !driver.opened.rig) real_time.adopt(role);
             ++threads;
         };
         // Counted by the pipeline; the supervisor says so.
@@ -128,7 +127,7 @@ struct Parts {
     void introduce() const {
         const RectifiedRig& rig = rectifier.rig();
         log().info("source {}: {}x{}", info().name, info().width, info().height);
-        if (!opened.note.empty()) log().warn("{}", opened.note);
+        if (!driver.opened.note.empty()) log().warn("{}", driver.opened.note);
         if (calibration)
             log().info("calibration {} ({}): f {:.2f} px, baseline {:.4f} m", calibration->source,
                        calibration->format, rig.focal_px, rig.baseline_m);
@@ -141,11 +140,11 @@ struct Parts {
                    publisher.url());
     }
 
-    const SourceInfo& info() const { return opened.source->info(); }
+    const SourceInfo& info() const { return driver.opened.source->info(); }
 
     Counters counters;
     Arena arena;
-    capture::OpenedSource opened;
+    OpenedDriver driver;
     std::optional<rig::StereoCalibration> calibration;
     settings::Settings settings;
     rig::Rectifier rectifier;
@@ -204,7 +203,8 @@ ExitStatus run_daemon(const DaemonOptions& options) {
     std::atomic<bool> pipeline_ended{false};
     std::atomic<bool> health_ended{false};
     Supervisor supervisor({parts->running, parts->counters, parts->tracker, parts->health, manager,
-                           parts->real_time, pipeline_ended, [&] { parts->reload(options); }});
+                           parts->real_time, parts->driver.cameras, pipeline_ended,
+                           [&] { parts->reload(options); }});
     std::jthread health([&] {
         pthread_setname_np(pthread_self(), "gl-health");
         supervisor.send_health();

@@ -1,8 +1,11 @@
 #include "daemon/driver.hpp"
 
+#include <memory>
 #include <string>
-#include <vector>
+#include <utility>
 
+#include "capture/driver_module.hpp"
+#include "capture/v4l2_driver.hpp"
 #include "core/error.hpp"
 
 namespace groundline::daemon {
@@ -19,26 +22,45 @@ std::vector<std::string> parts(const std::string& text) {
     return found;
 }
 
-}  // namespace
+OpenedDriver open_cameras(const settings::Settings& settings, std::unique_ptr<capture::CameraDriver> driver,
+                          Counters& counters) {
+    auto source = std::make_unique<capture::CameraSource>(settings::camera_source_config(settings),
+                                                          std::move(driver), counters);
+    OpenedDriver cameras;
+    cameras.cameras = source.get();
+    cameras.opened.source = std::move(source);
+    return cameras;
+}
 
-capture::OpenedSource open_driver(const settings::CaptureSettings& settings) {
-    if (settings.driver == settings::CaptureDriver::kV4l2 ||
-        settings.driver == settings::CaptureDriver::kLibcamera)
-        throw Refusal(ExitStatus::kConfig,
-                      "capture.driver: this program has no cameras; set files or synthetic");
+// Recorded or rendered pairs.
+OpenedDriver open_recorded(const settings::CaptureSettings& settings) {
     if (settings.source.empty())
         throw Refusal(ExitStatus::kConfig,
                       "capture.source is not set: name a recording (capture.driver: files) or a scene "
                       "(capture.driver: synthetic, capture.source: drive)");
-    switch (settings.driver) {
+    OpenedDriver recorded;
+    recorded.opened = capture::open_source(settings.driver == settings::CaptureDriver::kSynthetic
+                                               ? std::vector{"synthetic:" + settings.source}
+                                               : parts(settings.source));
+    return recorded;
+}
+
+}  // namespace
+
+OpenedDriver open_driver(const settings::Settings& settings, Counters& counters) {
+    const settings::CaptureSettings& capture = settings.capture;
+    switch (capture.driver) {
+        case settings::CaptureDriver::kV4l2:
+            return open_cameras(settings, std::make_unique<capture::V4l2Driver>(capture.camera), counters);
+        case settings::CaptureDriver::kLibcamera:
+            return open_cameras(settings,
+                                capture::load_driver("libcamera", capture.camera, capture::module_folders()),
+                                counters);
         case settings::CaptureDriver::kFiles:
-            return capture::open_source(parts(settings.source));
         case settings::CaptureDriver::kSynthetic:
-            return capture::open_source({"synthetic:" + settings.source});
-        default:
             break;
     }
-    throw Refusal(ExitStatus::kConfig, "capture.driver: there is no such driver in this program");
+    return open_recorded(capture);
 }
 
 std::vector<std::filesystem::path> calibration_files(const settings::CaptureSettings& settings) {

@@ -94,12 +94,23 @@ void Supervisor::tick(std::int64_t now_mono_ns) {
     }
     host_.realtime_scheduling = watched_.real_time.scheduling() ? 1 : 0;
     host_.memory_locked = watched_.real_time.memory_locked() ? 1 : 0;
+    look_at_cameras();
     watched_.tracker.add(host_);
-    const publish::HealthReport report = watched_.tracker.report(now_utime_us(), now_mono_ns);
+    publish::HealthReport report = watched_.tracker.report(now_utime_us(), now_mono_ns);
+    if (cameras_.out_of_step) report.reasons.add(Reason::kUnsynchronised);
     hand_over_health(report);
     watch(now_mono_ns);
     log_changes(report, now_mono_ns);
     tell_status(report, now_mono_ns);
+}
+
+void Supervisor::look_at_cameras() {
+    if (watched_.cameras == nullptr) return;
+    cameras_ = watched_.cameras->status();
+    host_.exposure_difference_ms = cameras_.exposure_difference_ms;
+    watched_.cameras->take_notices([](const capture::CameraNotice& notice) {
+        log().log(notice.good ? spdlog::level::info : spdlog::level::warn, "{}", notice.sentence.view());
+    });
 }
 
 void Supervisor::hand_over_health(const publish::HealthReport& report) {
@@ -172,6 +183,10 @@ void Supervisor::log_changes(const publish::HealthReport& report, std::int64_t n
 void Supervisor::tell_status(const publish::HealthReport& report, std::int64_t now_mono_ns) {
     if (status_mono_ns_ != 0 && now_mono_ns - status_mono_ns_ < kSecondNs) return;
     std::string status = status_of(report);
+    // Why there are none, as long as there are none.
+    if (watched_.cameras != nullptr && cameras_.state != verdict::CameraState::kRunning &&
+        !cameras_.last_fault.empty() && report.state != publish::LifeState::kStopping)
+        status += fmt::format(": {}", cameras_.last_fault.view());
     if (status == status_) return;
     watched_.manager.tell("STATUS=" + status);
     status_ = std::move(status);

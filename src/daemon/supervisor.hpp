@@ -6,6 +6,7 @@
 #include <functional>
 #include <string>
 
+#include "capture/camera_source.hpp"
 #include "core/counters.hpp"
 #include "daemon/host_health.hpp"
 #include "daemon/realtime.hpp"
@@ -26,6 +27,7 @@ struct Watched {
     publish::HealthPublisher& health;
     ServiceManager& manager;
     RealTime& real_time;
+    capture::CameraSource* cameras;  // null where pairs do not come from live cameras
     const std::atomic<bool>& pipeline_ended;
     // Reads the configuration again; says in the log what came of it.
     std::function<void()> reload;
@@ -47,6 +49,7 @@ class Supervisor {
 
   private:
     void tick(std::int64_t now_mono_ns);
+    void look_at_cameras();
     void watch(std::int64_t now_mono_ns);
     void log_changes(const publish::HealthReport& report, std::int64_t now_mono_ns);
     void tell_status(const publish::HealthReport& report, std::int64_t now_mono_ns);
@@ -59,6 +62,7 @@ class Supervisor {
 
     bool ready_ = false;
     publish::HostHealth host_;
+    capture::CameraStatus cameras_;
     std::int64_t host_mono_ns_ = 0;
     std::int64_t fed_mono_ns_ = 0;
     bool triggered_ = false;
