@@ -1,0 +1,20 @@
+"""Two vimc cameras through libcamera, in one process: pairs come, are processed and published."""
+import robot
+
+
+def case(stack):
+    robot.need_driver("libcamera")
+    robot.command("modprobe", "vimc")
+    robot.command("modprobe", "vimc_twin")
+    robot.command("udevadm", "settle")
+    radio = robot.Radio(stack)
+    settings = robot.camera_settings("platform/vimc.0 Sensor B", "platform/vimc.1 Sensor B", capture_driver="libcamera",
+                                     capture_pair__tolerance__ms=1000)
+    daemon = robot.Daemon(stack, **settings)
+    health = radio.wait_running(pairs=5)
+    robot.expect(robot.counters(health)["frames_bad"] == 0, robot.told(health))
+    daemon.end()
+    return robot.told(radio.now())
+
+
+robot.run(case)

@@ -1,0 +1,13 @@
+"""Rendered frames through two loopback cameras: at least 100 masks, each the one that files give."""
+import delivered
+import robot
+
+
+def case(stack):
+    robot.need_driver("v4l2")
+    left, right = robot.loopback()
+    return delivered.judge(stack, robot.camera_settings(left, right, capture_pair__tolerance__ms=20), {"capture_format": "grey"},
+                           robot.FRAMES, "GREY", [(left, robot.FRAMES / "left"), (right, robot.FRAMES / "right")])
+
+
+robot.run(case)

@@ -1,0 +1,26 @@
+"""The same frames give the same masks on the emulated processor (SSE 4 at most) as on this one."""
+import hashlib
+import pathlib
+
+import robot
+
+RENDERED = "drive?width=320&height=240&focal=250&boxes=2&seed=7"
+
+
+def hashes(folder):
+    files = [*sorted((folder / "mask").iterdir()), folder / "frames.jsonl"]
+    return {file.name: hashlib.sha256(file.read_bytes()).hexdigest() for file in files}
+
+
+def case(stack):
+    outside = pathlib.Path("/w/replayed")
+    inside = pathlib.Path("/tmp/replayed")
+    robot.command("/w/bin/groundline", "replay", f"synthetic:{RENDERED}", "--frames", "3", "--quiet", "--out", str(inside))
+    expected, got = hashes(outside), hashes(inside)
+    robot.expect(len(expected) == 4, f"outside there are {len(expected)} files")
+    other = [name for name in expected if got.get(name) != expected[name]]
+    robot.expect(not other, f"not the same bytes: {', '.join(other)}")
+    return f"{len(expected) - 1} masks and frames.jsonl are the same bytes"
+
+
+robot.run(case)

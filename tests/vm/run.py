@@ -1,0 +1,134 @@
+#!/usr/bin/env python3
+"""Runs the cases of tests/vm/cases in the virtual robot, each in a machine of its own; see ./dev vm.
+
+run.py --folder FOLDER --build BUILD [CASE...]
+One line a case; exit status 1 if any failed. FOLDER keeps the machine's image, as long as what it is made from does not
+change, and what each case said and wrote.
+"""
+import argparse
+import hashlib
+import os
+import pathlib
+import platform
+import re
+import shutil
+import subprocess
+import sys
+import time
+
+import machine
+
+HERE = pathlib.Path(__file__).resolve().parent
+CASES = HERE / "cases"
+CASE_LIMIT_S = 420  # for one that hangs
+SKIPPED = 77
+SCENE = "drive?width=320&height=240&focal=250&boxes=2&seed=7"
+FRAMES = 130
+
+
+def runtime_packages(programs):
+    """Debian packages with the libraries that the programs name."""
+    libraries = set()
+    for program in programs:
+        said = subprocess.run(["readelf", "-d", program], capture_output=True, text=True, check=True).stdout
+        libraries.update(re.findall(r"NEEDED.*\[(.*)\]", said))
+    patterns = [f"*/lib/x86_64-linux-gnu/{library}" for library in sorted(libraries)]
+    owners = subprocess.run(["dpkg-query", "-S", *patterns], capture_output=True, text=True, check=False).stdout
+    return sorted({line.split(":")[0] for line in owners.splitlines()})
+
+
+def make_image(folder, packages):
+    """The image's folder; made anew when one of the files it is made from, or the list of packages, is another."""
+    key = hashlib.sha256(" ".join(packages).encode())
+    for file in sorted([HERE / "image.sh", HERE / "vimc_twin.c", *(HERE / "guest").rglob("*")]):
+        if file.is_file():
+            key.update(file.read_bytes())
+    image = folder / f"image-{key.hexdigest()[:12]}"
+    if not (image / "made").exists():
+        print("The image of the machine is made:", flush=True)
+        for old in folder.glob("image-*"):
+            shutil.rmtree(old)
+        as_root = [] if os.geteuid() == 0 else ["sudo"]
+        subprocess.run([*as_root, HERE / "image.sh", image, *packages], check=True)
+    return image
+
+
+def make_shared(shared, programs):
+    """What the machine sees as /w: the programs, the cases, message types for Python, rendered frames."""
+    groundline, _, frames = programs
+    (shared / "bin").mkdir(parents=True, exist_ok=True)
+    for program in programs:
+        shutil.copy2(program, shared / "bin")
+    shutil.rmtree(shared / "vm", ignore_errors=True)
+    shutil.copytree(HERE, shared / "vm", ignore=shutil.ignore_patterns("guest", "__pycache__"))
+    types = sorted((HERE / "../../include/groundline/lcmtypes").resolve().glob("*.lcm"))
+    subprocess.run(["lcm-gen", "--python", "--ppath", shared / "messages", *types], check=True)
+    render = hashlib.sha256(frames.read_bytes() + f"{SCENE} {FRAMES}".encode()).hexdigest()
+    if not (shared / f"frames/{render}").exists():
+        shutil.rmtree(shared / "frames", ignore_errors=True)
+        subprocess.run([frames, SCENE, str(FRAMES), shared / "frames"], check=True)
+        (shared / f"frames/{render}").touch()
+    # The masks of this machine's own processor, for the case that compares them with the emulated one's.
+    shutil.rmtree(shared / "replayed", ignore_errors=True)
+    subprocess.run([groundline, "replay", f"synthetic:{SCENE}", "--frames", "3", "--quiet", "--out", shared / "replayed"],
+                   check=True)
+
+
+def run_case(robot, name, shared, out):
+    """Status and the case's last line."""
+    said = []
+    with open(out / f"{name}.log", "w", encoding="utf-8") as log:
+        def hear(line):
+            said.append(line)
+            print(line, file=log, flush=True)
+
+        try:
+            status = robot.run(f"PYTHONPATH=/w/vm python3 -u /w/vm/cases/{name}.py", shared, out / name, CASE_LIMIT_S,
+                               hear)
+        except machine.Broken as broken:
+            return 1, f"the machine: {broken}"
+    last = next((line for line in reversed(said) if line.strip()), "")
+    return (1, f"no end within {CASE_LIMIT_S} s; {last}") if status is None else (status, last)
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--folder", type=pathlib.Path, required=True)
+    parser.add_argument("--build", type=pathlib.Path, required=True)
+    parser.add_argument("cases", nargs="*")
+    wanted = parser.parse_args()
+    known = sorted(case.stem for case in CASES.glob("*.py"))
+    cases = wanted.cases or known
+    if strange := sorted(set(cases) - set(known)):
+        sys.exit(f"no such case: {', '.join(strange)}; there are {', '.join(known)}")
+    if platform.machine() != "x86_64":
+        sys.exit(f"The virtual robot is an amd64 one, this machine is {platform.machine()}: its programs do not run there.")
+    folder, build = wanted.folder.resolve(), wanted.build
+    out = folder / "cases"
+    shutil.rmtree(out, ignore_errors=True)
+    out.mkdir(parents=True)
+    programs = [build / "src/cli/groundline", build / "src/daemon/groundlined"]
+    try:
+        image = make_image(folder, runtime_packages(programs))
+    except subprocess.CalledProcessError:
+        sys.exit("The image of the virtual robot cannot be made; the lines above say why.")
+    shared = folder / "shared"
+    make_shared(shared, [*programs, build / "tests/vm_frames"])
+    robot = machine.Machine(image)
+    try:
+        if took_s := robot.prepare():
+            print(f"The machine was started and its state saved in {took_s:.0f} s.", flush=True)
+    except machine.Broken as broken:
+        sys.exit(f"The virtual robot: {broken}")
+    counts = {"passed": 0, "skipped": 0, "failed": 0}
+    for name in cases:
+        begin = time.monotonic()
+        status, why = run_case(robot, name, shared, out)
+        word = {0: "passed", SKIPPED: "skipped"}.get(status, "failed")
+        counts[word] += 1
+        print(f"{word:8} {name:22} {time.monotonic() - begin:4.0f} s  {why}", flush=True)
+    print(", ".join(f"{count} {word}" for word, count in counts.items()) + f"; logs are in {wanted.folder / 'cases'}.")
+    sys.exit(1 if counts["failed"] else 0)
+
+
+main()
