@@ -108,6 +108,15 @@ void Supervisor::look_at_cameras() {
     if (watched_.cameras == nullptr) return;
     cameras_ = watched_.cameras->status();
     host_.exposure_difference_ms = cameras_.exposure_difference_ms;
+    publish::CameraHealth health;
+    health.state = cameras_.state;
+    health.drift_ppm = cameras_.drift_ppm;
+    health.left_mean = cameras_.mean[0];
+    health.right_mean = cameras_.mean[1];
+    health.left_saturated = cameras_.saturated_share[0];
+    health.right_saturated = cameras_.saturated_share[1];
+    cameras_.last_fault.view().copy(health.fault.data(), health.fault.size() - 1);
+    watched_.tracker.add(health);
     watched_.cameras->take_notices([](const capture::CameraNotice& notice) {
         log().log(notice.good ? spdlog::level::info : spdlog::level::warn, "{}", notice.sentence.view());
     });

@@ -91,6 +91,7 @@ HealthReport HealthTracker::report(std::int64_t now_utime_us, std::int64_t now_m
     HealthReport report = last_.report;
     report.utime_us = now_utime_us;
     report.host = host_;
+    report.camera = camera_;
     if (last_.published > 0) report.host.epipolar_offset_px = last_.epipolar_offset_px;
     report.source_rate_hz = source_rate_hz_;
     report.process_rate_hz = process_rate_hz_;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <optional>
 
 #include "core/counters.hpp"
 #include "core/evidence.hpp"
@@ -11,6 +12,7 @@
 #include "core/latency_histogram.hpp"
 #include "core/result.hpp"
 #include "pipeline/triple_buffer.hpp"
+#include "verdict/camera_policy.hpp"
 
 namespace groundline::publish {
 
@@ -43,6 +45,17 @@ struct HostHealth {
     int memory_locked = -1;
 };
 
+// Of live cameras; as it is here where pairs come from elsewhere.
+struct CameraHealth {
+    std::optional<verdict::CameraState> state;
+    double drift_ppm = kNotMeasured;
+    double left_mean = kNotMeasured;
+    double right_mean = kNotMeasured;
+    double left_saturated = kNotMeasured;
+    double right_saturated = kNotMeasured;
+    std::array<char, 256> fault{};  // ends with a 0
+};
+
 // Fields as in lcmtypes/health_t.lcm.
 struct HealthReport {
     std::int64_t utime_us = 0;  // of the report
@@ -64,6 +77,7 @@ struct HealthReport {
     double brightness_gain = kNotMeasured;
     double brightness_offset = kNotMeasured;
     HostHealth host;
+    CameraHealth camera;
 
     HealthReport() { counts.fill(-1); }
 };
@@ -80,6 +94,7 @@ class HealthTracker {
 
     // All else is for the thread that asks for reports.
     void add(const HostHealth& host) { host_ = host; }
+    void add(const CameraHealth& camera) { camera_ = camera; }
     void stop() { stopping_ = true; }
 
     // No result yet, or none for longer than stale_after_ns.
@@ -115,6 +130,7 @@ class HealthTracker {
     // Of the reporting thread.
     Note last_;
     HostHealth host_;
+    CameraHealth camera_;
     bool stopping_ = false;
     bool window_open_ = false;
     Totals window_;  // where the running second began

@@ -37,6 +37,11 @@ static_assert(health_t::STATE_STARTING == static_cast<int>(LifeState::kStarting)
 static_assert(health_t::STATE_RUNNING == static_cast<int>(LifeState::kRunning));
 static_assert(health_t::STATE_STALLED == static_cast<int>(LifeState::kStalled));
 static_assert(health_t::STATE_STOPPING == static_cast<int>(LifeState::kStopping));
+static_assert(health_t::CAMERA_ABSENT == static_cast<int>(verdict::CameraState::kAbsent));
+static_assert(health_t::CAMERA_BACKING_OFF == static_cast<int>(verdict::CameraState::kBackingOff));
+static_assert(health_t::CAMERA_STALLED == static_cast<int>(verdict::CameraState::kStalled));
+static_assert(health_t::CAMERA_STARTING == static_cast<int>(verdict::CameraState::kStarting));
+static_assert(health_t::CAMERA_RUNNING == static_cast<int>(verdict::CameraState::kRunning));
 
 constexpr bool is_bit_of(std::int64_t bits, Reason reason) {
     Reasons reasons;
@@ -169,6 +174,7 @@ struct MessageEncoder::Parts {
             bytes->resize(kMaxGridCells);
         grid.elevation.resize(kMaxGridCells);
         grid.highest.resize(kMaxGridCells);
+        health.camera_fault.reserve(CameraHealth().fault.size());
         health.latencies.resize(kHealthLatencies);
         health.counters.resize(kHealthCounters);
         for (std::size_t stage = 0; stage < kStageNames.size(); ++stage)
@@ -425,6 +431,14 @@ MessageEncoder::Bytes MessageEncoder::health(const HealthReport& report) {
     out.exposure_difference_ms = wire(report.host.exposure_difference_ms);
     out.brightness_gain = wire(report.brightness_gain);
     out.brightness_offset = wire(report.brightness_offset);
+    out.camera_state =
+        static_cast<std::int8_t>(report.camera.state ? static_cast<int>(*report.camera.state) : -1);
+    out.camera_drift_ppm = wire(report.camera.drift_ppm);
+    out.left_mean = wire(report.camera.left_mean);
+    out.right_mean = wire(report.camera.right_mean);
+    out.left_saturated = wire(report.camera.left_saturated);
+    out.right_saturated = wire(report.camera.right_saturated);
+    out.camera_fault.assign(report.camera.fault.data());
     out.epipolar_offset_px = wire(report.host.epipolar_offset_px);
     out.temperature_c = wire(report.host.temperature_c);
     out.throttled = static_cast<std::int8_t>(report.host.throttled);

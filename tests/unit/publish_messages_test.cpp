@@ -90,7 +90,7 @@ TEST(Messages, FingerprintsAreThoseThatOthersCompiledAgainst) {
     EXPECT_EQ(static_cast<std::uint64_t>(mask_t::getHash()), 0x282646649fea32a4U);
     EXPECT_EQ(static_cast<std::uint64_t>(sectors_t::getHash()), 0xbf7d697723feefecU);
     EXPECT_EQ(static_cast<std::uint64_t>(ground_t::getHash()), 0xece73ec4bb2bb165U);
-    EXPECT_EQ(static_cast<std::uint64_t>(health_t::getHash()), 0xf0f9c8b8bfa1a48cU);
+    EXPECT_EQ(static_cast<std::uint64_t>(health_t::getHash()), 0x50beec97c7e42e58U);
     EXPECT_EQ(static_cast<std::uint64_t>(vdisparity_t::getHash()), 0xc372905163392668U);
     EXPECT_EQ(static_cast<std::uint64_t>(grid_t::getHash()), 0xe719f93181ce58e1U);
     // bot_core.image_t: members 0x6fee6cb20472ff6a plus its image_metadata_t, rotated by one.
@@ -257,13 +257,14 @@ HealthReport full_report() {
     report.brightness_gain = 1.03;
     report.brightness_offset = -1.5;
     report.host = {-2.0, 0.375, 61.5, 1, 0, 1};
+    report.camera = {verdict::CameraState::kStalled, 4.5, 100.0, 90.0, 0.25, 0.125, {"left is gone"}};
     return report;
 }
 
 TEST(Messages, HealthBytes) {
     MessageEncoder encoder;
     Golden golden;
-    golden.fingerprint(0xf0f9c8b8bfa1a48c).i64(99).i64(98).i8(4).i64(97).i8(1).i32(0x4000).i8(1);
+    golden.fingerprint(0x50beec97c7e42e58).i64(99).i64(98).i8(4).i64(97).i8(1).i32(0x4000).i8(1);
     golden.reals({0.5, 30.0, 29.0, 28.0}).i32(8);
     double first = 1.0;
     for (const char* stage : {"read", "rectify", "match", "ground", "classify", "write", "publish"})
@@ -276,7 +277,8 @@ TEST(Messages, HealthBytes) {
                              "camera_left_out", "camera_singles", "camera_superseded", "camera_restarts"})
         golden.text(name).i64(count++);
     golden.text("lcm_open_failures").i64(5);
-    golden.reals({0.25, -2.0, 1.03, -1.5, 0.375, 61.5}).i8(1).i8(0).i8(1);
+    golden.reals({0.25, -2.0, 1.03, -1.5}).i8(2).reals({4.5, 100.0, 90.0, 0.25, 0.125}).text("left is gone");
+    golden.reals({0.375, 61.5}).i8(1).i8(0).i8(1);
     EXPECT_EQ(copy(encoder.health(full_report())), golden.bytes);
 }
 
@@ -287,13 +289,16 @@ TEST(Messages, HealthSaysNotMeasured) {
          {message.result_age_s, message.source_rate_hz, message.process_rate_hz, message.publish_rate_hz,
           message.latencies.at(0).p50_ms, message.latencies.at(7).max_ms, message.pair_skew_ms,
           message.exposure_difference_ms, message.brightness_gain, message.brightness_offset,
-          message.epipolar_offset_px, message.temperature_c})
+          message.camera_drift_ppm, message.left_mean, message.right_mean, message.left_saturated,
+          message.right_saturated, message.epipolar_offset_px, message.temperature_c})
         EXPECT_EQ(std::bit_cast<std::uint64_t>(value), kWireNaN);
     EXPECT_EQ(message.exposure_mono_ns, -1);
     EXPECT_EQ(message.sequence, -1);
     EXPECT_EQ(message.throttled, -1);
     EXPECT_EQ(message.realtime_scheduling, -1);
     EXPECT_EQ(message.memory_locked, -1);
+    EXPECT_EQ(message.camera_state, -1);
+    EXPECT_EQ(message.camera_fault, "");
     for (const counter_t& counter : message.counters)
         EXPECT_EQ(counter.value, -1) << counter.name;
 }
