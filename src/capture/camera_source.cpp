@@ -16,7 +16,7 @@ using verdict::CameraEvent;
 using verdict::CameraState;
 
 constexpr double kNsPerMs = 1e6;
-constexpr std::int64_t kNoWait = std::numeric_limits<std::int64_t>::min();
+constexpr std::int64_t kNoWait = 0;  // a deadline long past
 // Every so many pairs the cameras are asked what they expose: a control costs a millisecond on USB.
 constexpr std::int64_t kExposurePairs = 15;
 // Cameras at the edge of the tolerance go in and out of step by the second; the log need not.

@@ -111,13 +111,13 @@ CameraDriver::Waited V4l2Driver::wait(std::int64_t deadline_mono_ns, CameraFrame
             const Waited waited = take(camera, polled_error, frame, fault);
             if (waited != Waited::kNothing) return waited;
         }
-        const std::int64_t left_ns = deadline_mono_ns - system_.mono_ns();
-        if (left_ns <= 0) return Waited::kNothing;
+        const std::int64_t now_ns = system_.mono_ns();
+        if (deadline_mono_ns <= now_ns) return Waited::kNothing;
+        const std::int64_t left_ns = std::min<std::int64_t>(deadline_mono_ns - now_ns, 1'000'000'000);
         for (std::size_t i = 0; i < cameras_.size(); ++i)
             fds[i] = {cameras_[i]->device.fd(), POLLIN, 0};
         const int ready =
-            system_.poll({fds.data(), cameras_.size()},
-                         static_cast<int>(std::min<std::int64_t>((left_ns + 999'999) / 1'000'000, 1000)));
+            system_.poll({fds.data(), cameras_.size()}, static_cast<int>((left_ns + 999'999) / 1'000'000));
         if (ready <= 0) fds = {};  // time is up, or interrupted
     }
 }

@@ -24,11 +24,9 @@ void give_up(CameraStep& step, CameraState state, std::int64_t now_ns, const Cam
     CameraLife& life = step.life;
     step.action = CameraAction::kClose;  // also after a failed opening, which may have got half way
     life.state = state;
-    ++life.failures;
-    const bool absent = state == CameraState::kAbsent;
-    life.retry_ns =
-        now_ns +
-        wait_after(life.failures, absent ? limits.longest_absent_retry_ns : limits.longest_retry_ns, limits);
+    life.retry_ns = now_ns + (state == CameraState::kAbsent
+                                  ? wait_after(++life.absences, limits.longest_absent_retry_ns, limits)
+                                  : wait_after(++life.failures, limits.longest_retry_ns, limits));
     tell(step);
 }
 
@@ -88,6 +86,7 @@ CameraStep step(const CameraLife& life, const CameraEvent& event, std::int64_t n
             step.life.state = CameraState::kStarting;
             step.life.since_ns = now_mono_ns;
             step.life.seen = {};
+            step.life.absences = 0;
             break;
         case Kind::kFault:
             step.life.fault = event.fault;

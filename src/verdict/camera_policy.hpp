@@ -78,7 +78,8 @@ struct CameraLife {
     CameraState state = CameraState::kAbsent;
     CameraFault fault = CameraFault::kNone;  // of the last failure
     int silent_eye = -1;                     // of the last stall
-    int failures = 0;                        // in a row
+    int absences = 0;                        // times it was not there, since it last was
+    int failures = 0;                        // other faults and stalls, since it last ran steadily
     std::int64_t since_ns = 0;               // with kStarting and kRunning: when that began
     std::int64_t retry_ns = 0;               // closed: when to open
     std::array<bool, 2> seen{};              // since the start

@@ -5,7 +5,9 @@
 #include <filesystem>
 #include <fstream>
 
+#include "capture/camera_source.hpp"
 #include "capture/v4l2_driver.hpp"
+#include "core/arena.hpp"
 #include "support/allocation_count.hpp"
 #include "unit/jpeg_support.hpp"
 #include "unit/v4l2_fake_kernel.hpp"
@@ -204,7 +206,12 @@ TEST(V4l2, AStampThatWrapsIsReplacedByTheArrival) {
         EXPECT_EQ(rig.frame.exposure_mono_ns, rig.kernel.now_ns);
         EXPECT_EQ(rig.frame.source, StampSource::kArrival);
     }
-    // But one that merely waited because the reader was held up keeps its own.
+    // One that is a period early, as the end of a frame that is still to come, is the device's own,
+    rig.left().expose(rig.kernel.now_ns + 200 * kMs, 1);
+    ASSERT_EQ(rig.wait(), Waited::kFrame);
+    EXPECT_EQ(rig.frame.exposure_mono_ns, rig.kernel.now_ns + 200 * kMs);
+    EXPECT_EQ(rig.frame.source, StampSource::kEndOfFrame);
+    // and so is one that waited because the reader was held up.
     const std::int64_t exposed_ns = rig.kernel.now_ns;
     rig.left().expose(exposed_ns, 1);
     rig.kernel.now_ns += 5000 * kMs;
@@ -574,6 +581,68 @@ TEST(V4l2, SteadyStreamingAllocatesNothing) {
         rig.driver.release(rig.frame);  // the fake's own set allocates here
     }
     EXPECT_EQ(allocated, 0U);
+}
+
+class KernelClock final : public SourceClock {
+  public:
+    explicit KernelClock(FakeKernel& kernel) : kernel_(kernel) {}
+    std::int64_t mono_ns() override { return kernel_.now_ns; }
+    std::int64_t utime_us() override { return kernel_.real_ns() / 1000; }
+    void sleep_until(std::int64_t mono_ns) override { kernel_.pass_to(mono_ns); }
+
+  private:
+    FakeKernel& kernel_;
+};
+
+// Source, driver, device and kernel together: every pair comes in its turn, and after an unplugging again.
+TEST(V4l2, TheWholeSourceRunsOnIt) {
+    FakeKernel kernel;
+    FakeCamera& left = kernel.camera("/dev/video0");
+    FakeCamera& right = kernel.camera("/dev/video2");
+    const std::int64_t begin_ns = kernel.now_ns;
+    for (int i = 0; i < 300; ++i) {
+        kernel.at(begin_ns + 33 * i * kMs, [&] {
+            if (left.streaming) left.expose(kernel.now_ns, static_cast<std::uint8_t>(left.sequence));
+        });
+        kernel.at(begin_ns + (33 * i + 4) * kMs, [&] {
+            if (right.streaming) right.expose(kernel.now_ns, static_cast<std::uint8_t>(right.sequence));
+        });
+    }
+    kernel.at(begin_ns + 3000 * kMs, [&] { right.answers = right.node = false; });
+    kernel.at(begin_ns + 6000 * kMs, [&] { right.answers = right.node = true; });
+    CameraSourceConfig config;
+    config.width = kWidth;
+    config.height = kHeight;
+    Counters counters;
+    KernelClock clock(kernel);
+    Arena arena;
+    StereoFrame frame = StereoFrame::make(arena, kWidth, kHeight, false);
+    std::vector<std::string> notices;
+    std::array<int, 10> pairs_in_second{};
+    {
+        CameraSource source(config, std::make_unique<V4l2Driver>(two_cameras(), kernel), counters, clock);
+        while (kernel.now_ns < begin_ns + 9000 * kMs) {
+            const std::int64_t before_ns = kernel.now_ns;
+            if (source.next(frame) == Pull::kFrame) {
+                ++pairs_in_second[static_cast<std::size_t>((kernel.now_ns - begin_ns) / (1000 * kMs))];
+                EXPECT_EQ(frame.stamp.skew_ns, 4 * kMs);
+                EXPECT_EQ(kernel.now_ns, frame.stamp.exposure_mono_ns + 4 * kMs) << "as soon as it is there";
+                EXPECT_EQ(frame.left.at(0, 0), frame.right.at(0, 0));
+            }
+            EXPECT_LE(kernel.now_ns - before_ns, 100 * kMs);
+            source.take_notices([&](const CameraNotice& it) { notices.emplace_back(it.sentence.view()); });
+        }
+        EXPECT_EQ(source.status().superseded, 0);
+    }
+    for (const std::size_t second : {1U, 2U, 7U, 8U})
+        EXPECT_GE(pairs_in_second[second], 29) << second;
+    EXPECT_EQ(pairs_in_second[4] + pairs_in_second[5], 0);
+    ASSERT_EQ(notices.size(), 3U);
+    EXPECT_EQ(notices[1], "right camera /dev/video2: gave no picture: No such device");
+    EXPECT_EQ(kernel.opened, kernel.closed);
+    EXPECT_EQ(kernel.mappings(), 0);
+    for (const std::string& breach : kernel.breaches)
+        ADD_FAILURE() << breach;
 }
 
 class V4l2Names : public testing::Test {

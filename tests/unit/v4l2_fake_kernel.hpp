@@ -65,7 +65,7 @@ struct FakeCamera {
         picture.index = *queued.begin();
         queued.erase(queued.begin());
         auto& memory = buffers[static_cast<std::size_t>(picture.index)];
-        std::memcpy(memory.data(), picture.bytes.data(), std::min(memory.size(), picture.bytes.size()));
+        std::copy_n(picture.bytes.begin(), std::min(memory.size(), picture.bytes.size()), memory.begin());
         ready.push_back(std::move(picture));
     }
     void expose(std::int64_t stamp_ns, std::uint8_t grey,
@@ -79,6 +79,13 @@ class FakeKernel final : public V4l2System {
     FakeCamera& camera(const std::string& path) { return cameras_[path]; }
     // Runs `what` when the time has come, while somebody polls.
     void at(std::int64_t mono_ns, std::function<void()> what) { script_.emplace(mono_ns, std::move(what)); }
+
+    // Lets time pass while nobody polls.
+    void pass_to(std::int64_t mono_ns) {
+        while (!script_.empty() && script_.begin()->first <= mono_ns)
+            run_next();
+        now_ns = std::max(now_ns, mono_ns);
+    }
 
     std::int64_t now_ns = 1'000'000 * kMs;
     std::int64_t wall_minus_mono_ns = 1'700'000'000'000 * kMs;
@@ -155,10 +162,7 @@ class FakeKernel final : public V4l2System {
                 now_ns = std::max(now_ns, until_ns);
                 return 0;
             }
-            now_ns = std::max(now_ns, script_.begin()->first);
-            const auto what = std::move(script_.begin()->second);
-            script_.erase(script_.begin());
-            what();
+            run_next();
         }
     }
     int ioctl(int fd, unsigned long request, void* argument) override {
@@ -189,6 +193,12 @@ class FakeKernel final : public V4l2System {
     std::int64_t real_ns() override { return now_ns + wall_minus_mono_ns; }
 
   private:
+    void run_next() {
+        now_ns = std::max(now_ns, script_.begin()->first);
+        const auto what = std::move(script_.begin()->second);
+        script_.erase(script_.begin());
+        what();
+    }
     bool interrupted() { return interruptions > 0 && interruptions-- > 0; }
     FakeCamera* of(int fd) {
         for (auto& [path, camera] : cameras_)

@@ -92,9 +92,9 @@ TEST(CameraPolicy, OtherFaultsBackOffFurtherAndEachKindIsNamed) {
                                   {11750, kTick, State::kBackingOff, Action::kOpen}});
     // From failing to not there: looked for soon again.
     play({{11750, CameraEvent::failed(Fault::kAbsent), State::kAbsent, Action::kClose, true},
-          {12749, kTick, State::kAbsent},
-          {12750, kTick, State::kAbsent, Action::kOpen},
-          {12750, CameraEvent::failed(Fault::kRefused), State::kBackingOff, Action::kClose, true}},
+          {11999, kTick, State::kAbsent},
+          {12000, kTick, State::kAbsent, Action::kOpen},
+          {12000, CameraEvent::failed(Fault::kRefused), State::kBackingOff, Action::kClose, true}},
          life);
 }
 
@@ -132,15 +132,39 @@ TEST(CameraPolicy, ACallerThatWasHeldUpFindsNoStall) {
     play(rows);
 }
 
-TEST(CameraPolicy, UnpluggedAndBackIsToldTwiceAndSteadyRunningForgives) {
+TEST(CameraPolicy, UnpluggedAndBackIsToldTwiceAndItsWaitsAreShortEachTime) {
     CameraLife life = play(started());
-    life = play({{5000, CameraEvent::failed(Fault::kAbsent), State::kAbsent, Action::kClose, true},
-                 {5250, kTick, State::kAbsent, Action::kOpen},
-                 {5251, CameraEvent::failed(Fault::kAbsent), State::kAbsent, Action::kClose},
-                 {5751, kTick, State::kAbsent, Action::kOpen},
-                 {5800, kOpened, State::kStarting},
-                 {6000, CameraEvent::picture(2), State::kRunning, Action::kNone, true}},
-                life);
+    for (int i = 0; i < 3; ++i) {
+        const std::int64_t at = 5000 + 3000 * i;
+        life = play({{at, CameraEvent::failed(Fault::kAbsent), State::kAbsent, Action::kClose, true},
+                     {at + 250, kTick, State::kAbsent, Action::kOpen},
+                     {at + 251, CameraEvent::failed(Fault::kAbsent), State::kAbsent, Action::kClose},
+                     {at + 751, kTick, State::kAbsent, Action::kOpen},
+                     {at + 800, kOpened, State::kStarting},
+                     {at + 1000, CameraEvent::picture(2), State::kRunning, Action::kNone, true}},
+                    life);
+    }
+}
+
+TEST(CameraPolicy, AfterALongAbsenceTheFirstFailureIsTriedAgainSoon) {
+    CameraLife life;
+    for (int i = 0; i < 20; ++i)
+        life = step(life, CameraEvent::failed(Fault::kAbsent), i * 1000 * kMs, kLimits).life;
+    play({{20'000, CameraEvent::failed(Fault::kRefused), State::kBackingOff, Action::kClose, true},
+          {20'249, kTick, State::kBackingOff},
+          {20'250, kTick, State::kBackingOff, Action::kOpen}},
+         life);
+}
+
+TEST(CameraPolicy, OnlySteadyRunningForgivesFailures) {
+    const std::vector<Row> fails = {
+        {5000, CameraEvent::failed(Fault::kFailed), State::kBackingOff, Action::kClose, true},
+        {5250, kTick, State::kBackingOff, Action::kOpen},
+        {5251, CameraEvent::failed(Fault::kFailed), State::kBackingOff, Action::kClose},
+        {5751, kTick, State::kBackingOff, Action::kOpen},
+        {5800, kOpened, State::kStarting},
+        {6000, CameraEvent::picture(2), State::kRunning, Action::kNone, true}};
+    const CameraLife life = play(fails, play(started()));
     EXPECT_EQ(life.failures, 2);
     EXPECT_EQ(play({{15'999, CameraEvent::picture(2), State::kRunning}}, life).failures, 2);
     EXPECT_EQ(play({{16'000, CameraEvent::picture(2), State::kRunning}}, life).failures, 0);
