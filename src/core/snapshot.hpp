@@ -27,9 +27,8 @@ class Snapshot {
         const std::uint64_t version = version_.load(std::memory_order_relaxed);
         version_.store(version + 1, std::memory_order_relaxed);
         // Whoever sees a word of this store, sees the odd version too.
-        std::atomic_thread_fence(std::memory_order_release);
         for (std::size_t i = 0; i < kWords; ++i)
-            words_[i].store(words[i], std::memory_order_relaxed);
+            words_[i].store(words[i], std::memory_order_release);
         version_.store(version + 2, std::memory_order_release);
     }
 
@@ -38,8 +37,7 @@ class Snapshot {
         for (;;) {
             const std::uint64_t before = version_.load(std::memory_order_acquire);
             for (std::size_t i = 0; i < kWords; ++i)
-                words[i] = words_[i].load(std::memory_order_relaxed);
-            std::atomic_thread_fence(std::memory_order_acquire);
+                words[i] = words_[i].load(std::memory_order_acquire);
             if (before % 2 == 0 && version_.load(std::memory_order_relaxed) == before) break;
         }
         T value;
