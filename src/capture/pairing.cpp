@@ -7,6 +7,9 @@ namespace groundline::capture {
 namespace {
 
 constexpr std::int64_t kSecondNs = 1'000'000'000;
+// So many pictures of one eye without a pair end a row: more than a camera at a third of the other's rate
+// leaves.
+constexpr int kRowEnds = 5;
 
 template <typename Vector>
 auto median_of(Vector& values) {
@@ -24,6 +27,8 @@ Pairing::DroppedFrames Pairing::add(const StampedFrame& frame) {
     Waiting& other = waiting_[1 - eye];
     std::optional<std::int64_t>& last_ns = last_ns_[eye];
     since_pair_[eye] = std::min(since_pair_[eye] + 1, kOutOfStep);
+    if (since_pair_[eye] >= kRowEnds) pairs_in_a_row_ = 0;
+    if (since_pair_[0] >= kOutOfStep && since_pair_[1] >= kOutOfStep) out_of_step_ = true;
     if (last_ns && frame.stamp_ns <= *last_ns) {
         dropped.push_back({frame, Fate::kSingle});
         return dropped;
@@ -36,7 +41,7 @@ Pairing::DroppedFrames Pairing::add(const StampedFrame& frame) {
     const auto nearest = std::min_element(
         other.begin(), other.end(), [&](const auto& a, const auto& b) { return distance(a) < distance(b); });
     const bool found = nearest != other.end() && distance(*nearest) <= config_.tolerance_ns;
-    if (!found && out_of_step() && last_ns_[1 - eye]) {
+    if (!found && out_of_step_ && last_ns_[1 - eye]) {
         const std::int64_t near_ns = nearest != other.end() ? nearest->stamp_ns : *last_ns_[1 - eye];
         skew_ns_ = frame.eye == 1 ? frame.stamp_ns - near_ns : near_ns - frame.stamp_ns;
     }
@@ -87,12 +92,10 @@ Pairing::DroppedFrames Pairing::reset() {
     return dropped;
 }
 
-bool Pairing::out_of_step() const {
-    return since_pair_[0] >= kOutOfStep && since_pair_[1] >= kOutOfStep;
-}
-
 void Pairing::note_pair(const FramePair& pair) {
     since_pair_ = {};
+    pairs_in_a_row_ = std::min(pairs_in_a_row_ + 1, kOutOfStep);
+    if (pairs_in_a_row_ == kOutOfStep) out_of_step_ = false;
     skew_ns_ = pair.skew_ns();
     const std::int64_t at_ns = pair.left.stamp_ns;
     if (second_.empty()) second_begins_ns_ = at_ns;

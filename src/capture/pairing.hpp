@@ -62,8 +62,9 @@ class Pairing {
     DroppedFrames reset();
     void set_max_waiting(int frames) { config_.max_waiting = frames; }
 
-    // Both eyes have delivered kOutOfStep pictures and more since the last pair, or since the start.
-    bool out_of_step() const;
+    // Both eyes have delivered kOutOfStep pictures without a pair among them, and since then there were not
+    // as many pairs in a row: cameras far apart meet by chance now and then.
+    bool out_of_step() const { return out_of_step_; }
     // Of the last pair; of the nearest two pictures while out of step. 0 before there was any.
     std::int64_t skew_ns() const { return skew_ns_; }
     // How much faster the skew grows than time, in parts per million (1 ppm is 0.06 ms a minute): positive
@@ -90,7 +91,9 @@ class Pairing {
     PairingConfig config_;
     std::array<Waiting, 2> waiting_;
     std::array<std::optional<std::int64_t>, 2> last_ns_;
-    std::array<int, 2> since_pair_{};
+    std::array<int, 2> since_pair_{};  // pictures
+    int pairs_in_a_row_ = 0;
+    bool out_of_step_ = false;
     std::optional<FramePair> newest_;
     std::int64_t skew_ns_ = 0;
 

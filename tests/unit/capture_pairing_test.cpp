@@ -105,8 +105,17 @@ TEST(Pairing, OutOfStepIsSaidWhenBothDeliverAndNothingPairs) {
     play.add({{0, 1000}, {1, 1040}});
     EXPECT_EQ(play.pairing.skew_ns(), 40 * kMs) << "how far they are apart";
     play.add({{0, 1100}, {1, 1101}});
-    EXPECT_FALSE(play.pairing.out_of_step());
+    EXPECT_TRUE(play.pairing.out_of_step()) << "one pair may be chance";
     EXPECT_EQ(play.pairing.skew_ns(), 1 * kMs);
+    for (int i = 12; i < 20; ++i)
+        play.add({{0, 100 * i}, {1, 100 * i + 1}});
+    for (int i = 20; i < 25; ++i)
+        play.add({{0, 100 * i}, {1, 100 * i + 40}});
+    play.add({{0, 2500}, {1, 2501}});
+    EXPECT_TRUE(play.pairing.out_of_step()) << "nine, and then none for a while";
+    for (int i = 26; i < 35; ++i)
+        play.add({{0, 100 * i}, {1, 100 * i + 1}});
+    EXPECT_FALSE(play.pairing.out_of_step());
 }
 
 TEST(Pairing, ResetForgetsAndGivesEverythingBack) {
