@@ -24,7 +24,8 @@ namespace groundline::pipeline {
 //
 // Memory order: the exchange releases the slot just written and acquires the slot just received, so the
 // filling happens before the reading and the reading before the next filling of the same slot.
-template <typename T>
+// `Atomic` is another only where a test steps through the protocol.
+template <typename T, template <typename> typename Atomic = std::atomic>
 class TripleBuffer final : public HandOver<T> {
   public:
     explicit TripleBuffer(const std::array<T, 3>& slots) : slots_(slots) {}
@@ -79,10 +80,10 @@ class TripleBuffer final : public HandOver<T> {
     }
 
     std::array<T, 3> slots_;
-    alignas(64) std::atomic<std::uint32_t> state_{1};
-    alignas(64) std::atomic<std::uint32_t> changes_{0};
-    std::atomic<bool> ended_{false};
-    std::atomic<bool> closed_{false};
+    alignas(64) Atomic<std::uint32_t> state_{1};
+    alignas(64) Atomic<std::uint32_t> changes_{0};
+    Atomic<bool> ended_{false};
+    Atomic<bool> closed_{false};
     alignas(64) std::uint32_t write_ = 0;
     alignas(64) std::uint32_t read_ = 2;
 };
