@@ -1,5 +1,6 @@
 #include "daemon/log.hpp"
 
+#include <pthread.h>
 #include <spdlog/async.h>
 #include <spdlog/async_logger.h>
 #include <spdlog/pattern_formatter.h>
@@ -34,7 +35,7 @@ class Priority final : public spdlog::custom_flag_formatter {
 };
 
 std::shared_ptr<spdlog::logger> make_log() {
-    spdlog::init_thread_pool(kQueuedLines, 1);
+    spdlog::init_thread_pool(kQueuedLines, 1, [] { pthread_setname_np(pthread_self(), "gl-log"); });
     auto logger = std::make_shared<spdlog::async_logger>(
         kName, std::make_shared<spdlog::sinks::stderr_sink_mt>(), spdlog::thread_pool(),
         spdlog::async_overflow_policy::overrun_oldest);

@@ -1,7 +1,10 @@
 // The daemon as a service manager and a controller see it: start, health, reload, watchdog, end, refusals.
 #include <gtest/gtest.h>
 
+#include <sched.h>
+
 #include <algorithm>
+#include <array>
 #include <csignal>
 #include <fstream>
 #include <regex>
@@ -266,6 +269,130 @@ TEST_F(Daemon, ARecordingThatIsNotRepeatedEndsTheProgram) {
                            "capture.source=drive?width=160&height=120&focal=125&rate_hz=30&frames=10"}));
     EXPECT_EQ(service.wait(), 0) << service.said();
     EXPECT_EQ(service.told("STOPPING=1"), 1);
+}
+
+// Everything the program does on the threads that handle frames, for 1000 frames, LCM's own part apart.
+TEST_F(Daemon, ThreadsOfFramesAllocateLockAndWriteNothing) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+    GTEST_SKIP() << "a sanitizer stands in the place of the counters";
+#endif
+    Receiver receiver(lcm_url());
+    Start with =
+        start({"--set", "capture.source=plane?width=64&height=48&focal=50&rate_hz=200&frames=100000", "--set",
+               "process.threads=2", "--set", "publish.preview=on", "--set", "publish.v_disparity=on"});
+    const std::string result = folder_.at("forbidden");
+    with.environment = {{"LD_PRELOAD", GROUNDLINE_FORBIDDEN_PRELOAD}, {"GROUNDLINE_FORBIDDEN", result}};
+    Service service(with);
+    const auto delivered = [&] {
+        for (const counter_t& counter : receiver.last<health_t>("GROUNDLINE_HEALTH").counters)
+            if (counter.name == "results_delivered") return counter.value;
+        return std::int64_t{0};
+    };
+    ASSERT_TRUE(receiver.until([&] { return delivered() >= 50; })) << service.said();
+    service.signal(SIGUSR2);
+    service.signal(SIGHUP);
+    const std::int64_t begin = delivered();
+    ASSERT_TRUE(receiver.until([&] { return delivered() >= begin + 1000; }, 6 * kPatienceMs))
+        << delivered() - begin;
+    service.signal(SIGUSR2);
+    std::map<std::string, std::array<std::int64_t, 6>> threads;
+    ASSERT_TRUE(eventually([&] {
+        std::ifstream lines(result);
+        std::string name;
+        std::array<std::int64_t, 6> counts{};
+        while (lines >> name >> counts[0] >> counts[1] >> counts[2] >> counts[3] >> counts[4] >> counts[5])
+            threads[name] = counts;
+        return threads.contains("gl-sinks") && threads.contains("gl-health");
+    })) << "nothing was counted";
+    for (const auto& [name, counts] : threads) {
+        const bool frames =
+            name == "gl-capture" || name == "gl-process" || name == "gl-worker1" || name == "gl-sinks";
+        if (!frames) continue;
+        EXPECT_EQ(counts[0], 0) << "allocations on " << name;
+        EXPECT_EQ(counts[1], 0) << "locks on " << name;
+        EXPECT_EQ(counts[2], 0) << "output on " << name;
+    }
+    // The counters themselves: the sinks sent, LCM locked, and the supervisor, which may, read a file.
+    EXPECT_GE(threads["gl-sinks"][5], 3000);
+    EXPECT_GE(threads["gl-sinks"][4], threads["gl-sinks"][5]);
+    EXPECT_GT(threads["groundlined"][0], 0);
+    RecordProperty("lcm_allocations", std::to_string(threads["gl-sinks"][3]));
+    RecordProperty("lcm_locks", std::to_string(threads["gl-sinks"][4]));
+    RecordProperty("messages", std::to_string(threads["gl-sinks"][5]));
+}
+
+// What the kernel says of a thread: its policy and priority.
+std::pair<int, int> schedule_of(const Service& service, const std::string& thread) {
+    const std::filesystem::path tasks = "/proc/" + std::to_string(service.pid()) + "/task";
+    for (const auto& task : std::filesystem::directory_iterator(tasks)) {
+        std::ifstream comm(task.path() / "comm");
+        std::string name;
+        if (!std::getline(comm, name) || name != thread) continue;
+        const pid_t id = std::stoi(task.path().filename());
+        sched_param parameters{};
+        sched_getparam(id, &parameters);
+        return {sched_getscheduler(id), parameters.sched_priority};
+    }
+    return {-1, -1};
+}
+
+bool may_be_real_time() {
+    const sched_param before{};
+    sched_param wanted{};
+    wanted.sched_priority = 1;
+    const bool may = sched_setscheduler(0, SCHED_FIFO, &wanted) == 0;
+    sched_setscheduler(0, SCHED_OTHER, &before);
+    return may;
+}
+
+TEST_F(Daemon, RunsInRealTimeWhereThatIsPermitted) {
+    if (!may_be_real_time()) GTEST_SKIP() << "real-time scheduling is not permitted here";
+    Receiver receiver(lcm_url());
+    // Two pairs from files: a renderer's thread is never real-time.
+    const Folder folder;
+    ASSERT_EQ(run_groundline(
+                  {"synth", "boxes?width=160&height=120&focal=125&frames=2", "--out", folder.at("pairs")})
+                  .status,
+              0);
+    Service service(start({"--set", "capture.driver=files", "--set", "capture.source=" + folder.at("pairs"),
+                           "--set", "realtime.scheduling=on", "--set", "process.threads=2", "--set",
+                           "realtime.capture_priority=31", "--set", "realtime.sinks_cpus=0"}));
+    ASSERT_TRUE(receiver.until([&] { return receiver.on("GROUNDLINE_HEALTH").size() >= 10; }))
+        << service.said();
+    EXPECT_EQ(schedule_of(service, "gl-capture"), std::make_pair(SCHED_FIFO, 31));
+    EXPECT_EQ(schedule_of(service, "gl-process"), std::make_pair(SCHED_FIFO, 20));
+    EXPECT_EQ(schedule_of(service, "gl-worker1"), std::make_pair(SCHED_FIFO, 20));
+    EXPECT_EQ(schedule_of(service, "gl-sinks"), std::make_pair(SCHED_FIFO, 10));
+    EXPECT_EQ(schedule_of(service, "groundlined").first, SCHED_OTHER);
+    EXPECT_EQ(schedule_of(service, "gl-health").first, SCHED_OTHER);
+    const auto health = receiver.last<health_t>("GROUNDLINE_HEALTH");
+    EXPECT_EQ(health.realtime_scheduling, 1);
+    EXPECT_EQ(health.memory_locked, 1) << service.said();
+    EXPECT_FALSE(service.says("refused")) << service.said();
+    // A thread that never pauses: the kernel says so, and all of them are made ordinary.
+    service.signal(SIGXCPU);
+    ASSERT_TRUE(eventually([&] { return schedule_of(service, "gl-worker1").first == SCHED_OTHER; }));
+    EXPECT_EQ(schedule_of(service, "gl-capture").first, SCHED_OTHER);
+    EXPECT_TRUE(receiver.until(
+        [&] { return receiver.last<health_t>("GROUNDLINE_HEALTH").realtime_scheduling == 0; }));
+}
+
+TEST_F(Daemon, WhatIsNotPermittedIsSaidOnceAndInHealth) {
+    Receiver receiver(lcm_url());
+    Start with = start({"--set", "realtime.scheduling=on", "--set", "process.threads=2", "--set",
+                        "realtime.sinks_cpus=1023"});
+    with.unprivileged = true;
+    Service service(with);
+    ASSERT_TRUE(receiver.until([&] { return receiver.on("GROUNDLINE_MASK").size() >= 5; })) << service.said();
+    const auto health = receiver.last<health_t>("GROUNDLINE_HEALTH");
+    EXPECT_EQ(health.realtime_scheduling, 0);
+    EXPECT_EQ(health.memory_locked, 0);
+    const std::string said = service.said();
+    for (const char* sentence : {"real-time scheduling was refused", "a list of processors was refused",
+                                 "memory could not be locked"}) {
+        EXPECT_NE(said.find(sentence), std::string::npos) << said;
+        EXPECT_EQ(said.find(sentence), said.rfind(sentence)) << said;
+    }
 }
 
 struct Refused {

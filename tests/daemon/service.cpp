@@ -1,8 +1,11 @@
 #include "daemon/service.hpp"
 
+#include <linux/capability.h>
 #include <poll.h>
 #include <sched.h>
+#include <sys/prctl.h>
 #include <sys/ptrace.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
@@ -62,6 +65,15 @@ Service::Service(const Start& start) {
         if (start.watchdog_us > 0) setenv("WATCHDOG_USEC", std::to_string(start.watchdog_us).c_str(), 1);
         if (start.journal) setenv("JOURNAL_STREAM", journal.c_str(), 1);
         if (!start.url.empty()) setenv("LCM_DEFAULT_URL", start.url.c_str(), 1);
+        for (const auto& [variable, value] : start.environment)
+            setenv(variable.c_str(), value.c_str(), 1);
+        if (start.unprivileged) {
+            for (const unsigned long right : {CAP_SYS_NICE, CAP_IPC_LOCK, CAP_SYS_RESOURCE})
+                prctl(PR_CAPBSET_DROP, right, 0, 0, 0);
+            const rlimit none{0, 0};
+            setrlimit(RLIMIT_RTPRIO, &none);
+            setrlimit(RLIMIT_MEMLOCK, &none);
+        }
         dup2(err[1], STDERR_FILENO);
         close(err[0]);
         close(err[1]);
@@ -162,8 +174,8 @@ Receiver::~Receiver() {
     if (lcm_ != nullptr) lcm_destroy(lcm_);
 }
 
-bool Receiver::until(const std::function<bool()>& so) {
-    const auto end = Clock::now() + milliseconds(kPatienceMs);
+bool Receiver::until(const std::function<bool()>& so, int patience_ms) {
+    const auto end = Clock::now() + milliseconds(patience_ms);
     while (!so()) {
         if (Clock::now() > end) return false;
         lcm_handle_timeout(lcm_, 50);

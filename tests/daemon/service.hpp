@@ -10,6 +10,7 @@
 #include <mutex>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "replay/program.hpp"
@@ -27,6 +28,8 @@ struct Start {
     std::int64_t watchdog_us = 0;
     bool journal = false;  // stderr says that it is the journal's
     std::string url = {};  // LCM_DEFAULT_URL
+    std::vector<std::pair<std::string, std::string>> environment = {};
+    bool unprivileged = false;  // without the right to real time and to lock memory
 };
 
 class Service {
@@ -89,8 +92,8 @@ class Receiver {
     Receiver& operator=(const Receiver&) = delete;
 
     bool good() const { return lcm_ != nullptr; }
-    // Takes what comes until it is so or kPatienceMs have passed.
-    bool until(const std::function<bool()>& so);
+    // Takes what comes until it is so or that time has passed.
+    bool until(const std::function<bool()>& so, int patience_ms = kPatienceMs);
     // Takes what comes for that long.
     void during(int ms);
     const std::vector<Bytes>& on(const std::string& channel) { return inbox_[channel]; }

@@ -1,11 +1,14 @@
 // The whole pipeline over a scripted source: order, losses, failures, ends, and what the hot path allocates.
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <chrono>
+#include <functional>
 #include <mutex>
 #include <thread>
 #include <vector>
 
+#include "core/clock.hpp"
 #include "pipeline/pipeline.hpp"
 #include "pipeline/worker_pool.hpp"
 #include "support/allocation_count.hpp"
@@ -272,6 +275,156 @@ TEST(Pipeline, StopsWhileItsSourceIsIdle) {
     EXPECT_EQ(sink.positions, (std::vector<std::int64_t>{0, 1}));
     EXPECT_EQ(source.idle(), 10);
     EXPECT_TRUE(run->report.interrupted);
+}
+
+// A worker pool that can be made as slow as one likes.
+class SlowParallel final : public Parallel {
+  public:
+    int lanes() const override { return 1; }
+    void for_each(int count, FunctionRef<void(int, int)> task) override {
+        if (delay_ms.load() > 0) std::this_thread::sleep_for(std::chrono::milliseconds(delay_ms.load()));
+        for (int index = 0; index < count; ++index)
+            task(index, 0);
+    }
+    std::atomic<int> delay_ms{0};
+};
+
+// Keeps what the last results said; stops the run when it is told to by what it sees.
+class WatchingSink final : public Sink {
+  public:
+    explicit WatchingSink(std::function<void(const FrameResult&)> see) : see_(std::move(see)) {}
+    bool consume(const FrameResult& result) override {
+        see_(result);
+        return true;
+    }
+    const std::string& error() const override { return error_; }
+
+  private:
+    std::function<void(const FrameResult&)> see_;
+    std::string error_;
+};
+
+void run_watched(FrameSource& source, Parallel& parallel, Sink& sink, const RunOptions& options,
+                 const std::atomic<bool>& stop, Counters& counters,
+                 const std::function<void(Pipeline&)>& before = {}) {
+    Arena arena;
+    const rig::Rectifier rectifier(kWidth, kHeight);
+    ProcessorConfig config;
+    config.matcher.disparities = 16;
+    Processor processor(config, rectifier, parallel, arena);
+    const std::array<SinkSlot, 1> sinks{{{&sink, std::nullopt, true}}};
+    Pipeline pipeline(source, processor, sinks, options.pace == Pace::kMax, arena, counters);
+    arena.seal();
+    if (before) before(pipeline);
+    const auto report = std::make_unique<RunReport>();
+    pipeline.run(
+        options, stop, [](const FrameStamp&, const std::string&) {}, *report);
+}
+
+TEST(Pipeline, OverloadIsSaidWhileItLastsAndRecoveredFrom) {
+    ScriptedSource source(100'000);
+    SlowParallel load;
+    Counters counters;
+    std::atomic<bool> stop{false};
+    std::int64_t seen_ns = 0;
+    int phase = 0;  // loaded, said, recovered
+    load.delay_ms = 20;
+    WatchingSink sink([&](const FrameResult& result) {
+        const bool said = result.reasons.has(Reason::kOverload);
+        if (phase == 0 && said) {
+            phase = 1;
+            EXPECT_NE(result.verdict, Verdict::kTrusted);
+            load.delay_ms = 0;
+        } else if (phase == 1 && !said) {
+            phase = 2;
+            stop = true;
+        }
+        if (seen_ns == 0) seen_ns = result.stamp.exposure_mono_ns;
+        // Far beyond any machine: two seconds to begin, five to end.
+        if (result.stamp.exposure_mono_ns - seen_ns > 200'000'000'000) stop = true;
+    });
+    RunOptions options;
+    options.pace = Pace::kFixed;
+    options.rate_hz = 50.0;
+    options.stamp_when_due = true;
+    run_watched(source, load, sink, options, stop, counters);
+    EXPECT_EQ(phase, 2) << "0: overload was never said; 1: it was never over";
+    EXPECT_GT(counters.get(Count::kFramesOverwritten), 0U);
+}
+
+TEST(Pipeline, ALosslessRunIsNeverOverloaded) {
+    ScriptedSource source(60);
+    SlowParallel load;
+    load.delay_ms = 5;
+    Counters counters;
+    WatchingSink sink([](const FrameResult& result) { EXPECT_FALSE(result.reasons.has(Reason::kOverload)); });
+    run_watched(source, load, sink, {}, kNeverStop, counters);
+    EXPECT_EQ(counters.get(Count::kResultsDelivered), 60U);
+}
+
+TEST(Pipeline, PacedPairsCanBeStampedAsIfTakenNow) {
+    ScriptedSource source(20);
+    SlowParallel parallel;
+    Counters counters;
+    const std::int64_t begin_ns = now_mono_ns();
+    const std::int64_t begin_us = now_utime_us();
+    std::int64_t last_ns = begin_ns - 1;
+    WatchingSink sink([&](const FrameResult& result) {
+        EXPECT_EQ(result.stamp.source, StampSource::kArrival);
+        EXPECT_GT(result.stamp.exposure_mono_ns, last_ns);
+        EXPECT_LE(result.stamp.exposure_mono_ns, now_mono_ns());
+        EXPECT_GE(result.stamp.utime_us, begin_us - 1000);
+        EXPECT_LE(result.stamp.utime_us, now_utime_us() + 1000);
+        last_ns = result.stamp.exposure_mono_ns;
+    });
+    RunOptions options;
+    options.pace = Pace::kFixed;
+    options.rate_hz = 200.0;
+    options.stamp_when_due = true;
+    run_watched(source, parallel, sink, options, kNeverStop, counters);
+    EXPECT_GT(last_ns, begin_ns);
+}
+
+TEST(Pipeline, TuningTakesEffectWholeFromTheNextFrame) {
+    ScriptedSource source(30);
+    SlowParallel parallel;
+    Counters counters;
+    Pipeline* running = nullptr;
+    int frames = 0;
+    int tuned = 0;
+    WatchingSink sink([&](const FrameResult& result) {
+        const bool is_tuned = result.tolerance_ratio == 0.3;
+        EXPECT_TRUE(is_tuned || result.tolerance_ratio == 0.15) << result.tolerance_ratio;
+        EXPECT_EQ(is_tuned, result.reasons.has(Reason::kDark)) << "limits and tolerances come together";
+        tuned += is_tuned ? 1 : 0;
+        if (++frames != 10) return;
+        Tuning tuning;
+        tuning.terrain.tolerance_ratio = 0.3;
+        tuning.limits.min_contrast = 1e9;
+        running->tune(tuning);
+    });
+    run_watched(source, parallel, sink, {}, kNeverStop, counters,
+                [&](Pipeline& pipeline) { running = &pipeline; });
+    EXPECT_EQ(frames, 30);
+    EXPECT_GE(tuned, 10);
+    EXPECT_LE(tuned, 20);
+}
+
+TEST(Pipeline, TellsEachThreadOnceAndCountsItsTurns) {
+    ScriptedSource source(5);
+    SlowParallel parallel;
+    Counters counters;
+    std::array<std::atomic<int>, 3> told{};
+    RunOptions options;
+    options.on_thread = [&](ThreadRole role) { ++told[static_cast<std::size_t>(role)]; };
+    Pipeline* running = nullptr;
+    std::uint64_t turns = 0;
+    WatchingSink counting([&](const FrameResult&) { turns = running->capture_turns(); });
+    run_watched(source, parallel, counting, options, kNeverStop, counters,
+                [&](Pipeline& pipeline) { running = &pipeline; });
+    for (const auto& count : told)
+        EXPECT_EQ(count.load(), 1);
+    EXPECT_GE(turns, 5U);
 }
 
 // On all threads of ours together: capture, processing, workers, sinks.

@@ -1,7 +1,9 @@
 // What health says about frames that come, slow down and stay away.
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
+#include <thread>
 
 #include "publish/health.hpp"
 #include "unit/publish_fixture.hpp"
@@ -143,6 +145,47 @@ TEST(Health, OthersMeasurementsPassThrough) {
     EXPECT_EQ(report.host.throttled, 1);
     EXPECT_EQ(report.host.memory_locked, 0);
     EXPECT_EQ(report.host.realtime_scheduling, -1);
+}
+
+// One thread notes, another reports: what a report says of a result is of one result, and counts only rise.
+TEST(Health, IsToldByAnotherThread) {
+    Frame frame(8, 4);
+    HealthTracker tracker(nullptr, kStaleAfter);
+    constexpr std::int64_t kResults = 20'000;
+    std::atomic<bool> done{false};
+    std::thread sinks([&] {
+        for (std::int64_t i = 1; i <= kResults; ++i) {
+            frame.result.stamp.sequence = i;
+            frame.result.stamp.skew_ns = i * kMs;
+            tracker.note(frame.result, i, i * kMs);
+        }
+        done = true;
+    });
+    std::int64_t last = -1;
+    for (bool end = false; !end;) {
+        end = done.load();
+        const HealthReport report = tracker.report(0, kResults * kMs);
+        ASSERT_GE(report.sequence, last);
+        last = report.sequence;
+        if (last < 0) continue;
+        ASSERT_EQ(report.pair_skew_ms, static_cast<double>(last));
+        ASSERT_LE(report.stages[static_cast<std::size_t>(Stage::kPublish)].p50_ms,
+                  report.stages[static_cast<std::size_t>(Stage::kPublish)].max_ms);
+    }
+    sinks.join();
+    EXPECT_EQ(last, kResults) << "the newest result is never lost";
+}
+
+TEST(Health, RowOffsetIsToldWhereItWasMeasured) {
+    Frame frame(8, 4);
+    HealthTracker tracker(nullptr, kStaleAfter);
+    frame.result.evidence.pair.row_features = 0;
+    tracker.note(frame.result, 1, 1);
+    EXPECT_TRUE(std::isnan(tracker.report(0, 1).host.epipolar_offset_px));
+    frame.result.evidence.pair.row_features = 9;
+    frame.result.evidence.pair.row_offset_px = -0.75;
+    tracker.note(frame.result, 1, 1);
+    EXPECT_EQ(tracker.report(0, 1).host.epipolar_offset_px, -0.75);
 }
 
 }  // namespace

@@ -16,6 +16,7 @@
 #include "groundline/mask_decoder.hpp"
 #include "groundline/mask_t.hpp"
 #include "groundline/sectors_t.hpp"
+#include "publish/health_publisher.hpp"
 #include "publish/lcm_link.hpp"
 #include "publish/lcm_publisher.hpp"
 #include "publish/messages.hpp"
@@ -236,6 +237,74 @@ TEST(Lcm, OpensLaterWhenItCannotAtFirst) {
     const auto health = read<health_t>(inbox["GROUNDLINE_HEALTH"].at(0));
     EXPECT_EQ(health.counters.back().name, "lcm_open_failures");
     EXPECT_EQ(health.counters.back().value, 2);
+}
+
+// A log's messages by channel.
+Inbox log_of(const std::filesystem::path& path) {
+    Inbox inbox;
+    lcm_eventlog_t* log = lcm_eventlog_create(path.c_str(), "r");
+    if (log == nullptr) return inbox;
+    while (lcm_eventlog_event_t* event = lcm_eventlog_read_next_event(log)) {
+        const auto* first = static_cast<const std::uint8_t*>(event->data);
+        inbox[event->channel].emplace_back(first, first + event->datalen);
+        lcm_eventlog_free_event(event);
+    }
+    lcm_eventlog_destroy(log);
+    return inbox;
+}
+
+TEST(Lcm, HealthGoesOutByItselfAndSaysSoWhereNoPairsCome) {
+    const Folder folder;
+    const std::filesystem::path path = folder.path / "log.lcm";
+    fake_now_ns = 7000 * kMs;
+    Counters counters;
+    {
+        HealthPublisher publisher(options_for("file://" + path.string() + "?mode=w", &counters));
+        HealthReport report;
+        report.utime_us = 99;
+        report.verdict = Verdict::kTrusted;
+        report.state = LifeState::kRunning;
+        EXPECT_TRUE(publisher.publish(report));
+        report.reasons.add(Reason::kNoFrames);
+        report.verdict = Verdict::kBlind;
+        EXPECT_TRUE(publisher.publish(report));
+        EXPECT_TRUE(publisher.error().empty());
+    }
+    Inbox inbox = log_of(path);
+    ASSERT_EQ(inbox.size(), 2U);
+    ASSERT_EQ(inbox["GROUNDLINE_HEALTH"].size(), 2U);
+    ASSERT_EQ(inbox["GROUNDLINE_SECTORS"].size(), 1U) << "only while no pairs come";
+    EXPECT_EQ(read<health_t>(inbox["GROUNDLINE_HEALTH"].at(0)).utime, 99);
+    const auto sectors = read<sectors_t>(inbox["GROUNDLINE_SECTORS"].at(0));
+    EXPECT_EQ(sectors.reasons, mask_t::REASON_NO_FRAMES);
+    EXPECT_EQ(sectors.count, 0);
+
+    HealthPublisher nowhere(options_for("file://" + (folder.path / "none" / "log.lcm").string(), &counters));
+    EXPECT_FALSE(nowhere.publish(HealthReport()));
+    EXPECT_EQ(counters.get(Count::kPublishFailures), 1U);
+    EXPECT_NE(nowhere.error().find("folder exists"), std::string::npos) << nowhere.error();
+}
+
+TEST(Lcm, ResultsAreNotedWhereOneAsksForThem) {
+    fake_now_ns = 9000 * kMs;
+    HealthTracker tracker(nullptr, 500 * kMs);
+    LcmOptions options = options_for("memq://");
+    options.tracker = &tracker;
+    options.channels.health = false;
+    LcmPublisher publisher(options);
+    const Frame frame(64, 48);
+    ASSERT_TRUE(publisher.consume(frame.result));
+    EXPECT_EQ(tracker.report(0, fake_now_ns).sequence, 41);
+    Inbox inbox;
+    lcm_subscribe(publisher.handle(), ".*", receive, &inbox);
+    publisher.show(true, true);
+    ASSERT_TRUE(publisher.consume(frame.result));
+    publisher.show(false, true);
+    ASSERT_TRUE(publisher.consume(frame.result));
+    drain(publisher.handle());
+    EXPECT_EQ(inbox.count("GROUNDLINE_HEALTH"), 0U);
+    EXPECT_EQ(inbox["GROUNDLINE_VDISPARITY"].size(), 1U);
+    EXPECT_EQ(inbox["GROUNDLINE_PREVIEW"].size(), 2U);
 }
 
 TEST(Lcm, ReopensAfterASecondOfFailures) {
