@@ -10,7 +10,7 @@ namespace groundline::stereo {
 // Chosen on 14 KITTI 2012 frames: share off by more than 3 px among the answered, at which density. The paper
 // (128 disparities, local mean removed): nothing tested 27.0 % at 99.8 %; left-right alone 10.6 at 71.4;
 // left-right and speckle 2.8 at 61.3; all defaults 1.5 at 52.3. The census pyramid (208 disparities): nothing
-// tested 5.3 % at 99.9 %; all defaults 3.7 at 95.6. Where no matcher is named, figures are the paper's.
+// tested 5.3 % at 99.9 %; all defaults 3.6 at 95.5. Where no matcher is named, figures are the paper's.
 struct CheckLimits {
     // Refine to 1/16 px by the equiangular fit to the costs before rule 2. Not a test.
     bool subpixel = true;
