@@ -115,7 +115,7 @@ TEST(Liveness, ALateLookFindsWhatMovedInBetween) {
     LivenessState state = judge_liveness(progress, {}, 0, kLimit).state;
     run_well(progress);
     EXPECT_EQ(judge_liveness(progress, state, 60'000 * kMs, kLimit).stuck, Stuck::kNone);
-    EXPECT_EQ(judge_liveness(progress, {}, 60'000 * kMs, kLimit).stuck, Stuck::kNone) << "a first look";
+    EXPECT_EQ(judge_liveness({}, {}, 60'000 * kMs, kLimit).stuck, Stuck::kNone) << "a first look";
 }
 
 }  // namespace
