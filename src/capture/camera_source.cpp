@@ -113,11 +113,11 @@ void CameraSource::open_devices() {
     out_of_step_told_ = false;
     follow_ = {};
     follows_ = config_.follow_exposure && !config_.side_by_side;
-    Fault fault = driver_->open();
+    Fault fault = on_device([&] { return driver_->open(); });
     if (fault.ok()) {
         // One more than waits is in a pair, or at hand.
         pairing_.set_max_waiting(std::clamp(driver_->buffers_to_hold() - 1, 1, config_.pairing.max_waiting));
-        fault = driver_->start();
+        fault = on_device([&] { return driver_->start(); });
     }
     if (fault.ok())
         apply(CameraEvent::opened());
@@ -260,14 +260,14 @@ void CameraSource::measure(const StereoFrame& frame) {
 }
 
 void CameraSource::follow_exposure() {
-    const ExposureValues left = driver_->read_exposure(Eye::kLeft);
-    const ExposureValues right = driver_->read_exposure(Eye::kRight);
+    const auto [left, right] = on_device(
+        [&] { return std::pair(driver_->read_exposure(Eye::kLeft), driver_->read_exposure(Eye::kRight)); });
     status_.exposure_difference_ms = (right.exposure_us - left.exposure_us) / 1000.0;
     if (!follows_) return;
     const verdict::FollowStep step = verdict::follow(follow_, left, right, pairs_, config_.follow);
     follow_ = step.state;
     if (!step.set) return;
-    const Fault fault = driver_->set_exposure(Eye::kRight, *step.set);
+    const Fault fault = on_device([&] { return driver_->set_exposure(Eye::kRight, *step.set); });
     if (fault.ok()) return;
     follows_ = false;  // until it is opened again
     status_.last_fault = fault.sentence;
@@ -326,7 +326,7 @@ void CameraSource::close_devices() {
     both_.reset();
     status_.out_of_step = false;
     out_of_step_told_ = false;
-    driver_->close();
+    on_device([&] { driver_->close(); });
 }
 
 void CameraSource::tell(bool good, const Sentence& sentence) {

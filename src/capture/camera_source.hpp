@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <boost/lockfree/spsc_queue.hpp>
 #include <cstdint>
 #include <limits>
@@ -82,10 +83,11 @@ SourceClock& real_source_clock();
 //
 // - The constructor opens nothing: cameras may be absent when the program starts. The size is the configured
 // one.
-// - next() waits at most kLongestWaitNs, then says kIdle. Only opening devices may take longer, as long as
-// the kernel
-//   does. Of all that is ready it takes the newest pair; the rest is counted. kBad is a pair with a picture
-//   that cannot be unpacked (a damaged JPEG); it never says kEnd.
+// - next() waits at most kLongestWaitNs, then says kIdle. Only calls that set a device up or close it may
+// take
+//   longer, as long as the kernel does; in_device_call() says so meanwhile. Of all that is ready it takes the
+//   newest pair; the rest is counted. kBad is a pair with a picture that cannot be unpacked (a damaged JPEG);
+//   it never says kEnd.
 // - A pair's stamp: exposure_mono_ns of the left picture, skew_ns to the right one, source kArrival if either
 // is dated
 //   by arrival, utime_us by the wall clock now; sequence and position count the pairs handed out.
@@ -105,6 +107,9 @@ class CameraSource final : public FrameSource {
     bool rewind() override { return false; }
 
     CameraStatus status() const { return published_.load(); }
+    // The capture thread is in the driver, opening, starting or closing devices or at their exposure: a
+    // camera that hangs on its bus holds it there for seconds, 5 of them for each control on USB. Any thread.
+    bool in_device_call() const { return in_device_call_.load(std::memory_order_acquire); }
     // Calls `each` for every notice since the last time, oldest first. Where nobody asks, the oldest 32 are
     // kept.
     void take_notices(FunctionRef<void(const CameraNotice&)> each);
@@ -129,6 +134,21 @@ class CameraSource final : public FrameSource {
     void on_fault(const Fault& fault);
     void apply(const verdict::CameraEvent& event);
     void close_devices();
+    // Does `call` on the driver while in_device_call() is true.
+    template <typename Call>
+    auto on_device(Call&& call) {
+        struct Mark {
+            explicit Mark(std::atomic<bool>& its_flag) : flag(its_flag) {
+                flag.store(true, std::memory_order_release);
+            }
+            Mark(const Mark&) = delete;
+            Mark& operator=(const Mark&) = delete;
+            ~Mark() { flag.store(false, std::memory_order_release); }
+            std::atomic<bool>& flag;
+        };
+        const Mark mark(in_device_call_);
+        return call();
+    }
     void tell(bool good, const Sentence& sentence);
     void publish();
 
@@ -152,6 +172,7 @@ class CameraSource final : public FrameSource {
     verdict::FollowState follow_;
     CameraStatus status_;
     Snapshot<CameraStatus> published_;
+    std::atomic<bool> in_device_call_{false};
     boost::lockfree::spsc_queue<CameraNotice, boost::lockfree::capacity<32>> notices_;
 };
 

@@ -69,6 +69,7 @@ class SimulatedCameras final : public CameraDriver {
     SimulatedCameras(World& world, bool side_by_side) : world_(world), side_by_side_(side_by_side) {}
 
     Fault open() override {
+        meet("open");
         if (open_) ADD_FAILURE() << "opened twice";
         ++opened;
         if (!answer_to_open.ok()) return answer_to_open;
@@ -76,6 +77,7 @@ class SimulatedCameras final : public CameraDriver {
         return {};
     }
     Fault start() override {
+        meet("start");
         world_.pass_to(world_.now_ns + start_takes_ms * kMs);
         started_ns_ = world_.now_ns;
         for (SimulatedEye& eye : eyes)
@@ -85,6 +87,7 @@ class SimulatedCameras final : public CameraDriver {
     }
     Waited wait(std::int64_t deadline_ns, CameraFrame& frame, Fault& fault) override {
         EXPECT_TRUE(open_) << "waited on what is closed";
+        meet("wait");
         for (;;) {
             if (!breaks.ok()) {
                 fault = breaks;
@@ -117,6 +120,7 @@ class SimulatedCameras final : public CameraDriver {
             << "released what is not held";
     }
     void close() override {
+        meet("close");
         open_ = false;
         held_.clear();
         ++closed;
@@ -125,12 +129,16 @@ class SimulatedCameras final : public CameraDriver {
     std::string_view description() const override { return "two simulated cameras"; }
     std::int64_t left_out() const override { return 3; }
     Fault set_exposure(Eye eye, const ExposureValues& wanted) override {
+        meet("set exposure");
         ++exposure_commands;
         if (!answer_to_exposure.ok()) return answer_to_exposure;
         eyes[static_cast<std::size_t>(eye)].exposure = wanted;
         return {};
     }
-    ExposureValues read_exposure(Eye eye) override { return eyes[static_cast<std::size_t>(eye)].exposure; }
+    ExposureValues read_exposure(Eye eye) override {
+        meet("read exposure");
+        return eyes[static_cast<std::size_t>(eye)].exposure;
+    }
 
     bool is_open() const { return open_; }
     std::size_t held() const { return held_.size(); }
@@ -145,8 +153,12 @@ class SimulatedCameras final : public CameraDriver {
     int opened = 0;
     int closed = 0;
     int exposure_commands = 0;
+    std::function<void(const char*)> on_call;  // sees each call that may take its time, and wait()
 
   private:
+    void meet(const char* call) const {
+        if (on_call) on_call(call);
+    }
     std::int64_t stamp_ns(int eye) const {
         const SimulatedEye& it = eyes[static_cast<std::size_t>(eye)];
         return started_ns_ +
@@ -549,6 +561,24 @@ TEST(CameraSource, TheRightCameraFollowsTheLeftOnesExposure) {
     EXPECT_EQ(unwilling.cameras->exposure_commands, 1) << "asked once for each opening";
     EXPECT_EQ(unwilling.notices, (Notices{"+ two simulated cameras", "- takes no exposure"}));
     EXPECT_GT(unwilling.pairs, 500);
+}
+
+TEST(CameraSource, SaysWhileADeviceMayTakeItsTime) {
+    Robot robot(false, true);
+    std::map<std::string, std::set<bool>> seen;
+    robot.cameras->on_call = [&](const char* call) { seen[call].insert(robot.source->in_device_call()); };
+    robot.world.at(2.0, [&] { robot.cameras->eyes[0].exposure = {9000, 20}; });
+    robot.world.at(5.0, [&] { robot.cameras->breaks = kGone; });
+    robot.world.at(5.1, [&] { robot.cameras->breaks = {}; });
+    EXPECT_FALSE(robot.source->in_device_call());
+    robot.run_until(7.0);
+    EXPECT_FALSE(robot.source->in_device_call());
+    robot.cameras->on_call = nullptr;
+    const std::set<bool> always = {true};
+    const std::map<std::string, std::set<bool>> wanted = {{"open", always},          {"start", always},
+                                                          {"close", always},         {"set exposure", always},
+                                                          {"read exposure", always}, {"wait", {false}}};
+    EXPECT_EQ(seen, wanted);
 }
 
 TEST(CameraSource, AFailedStartIsClosedAndBackedOff) {
