@@ -21,6 +21,7 @@ from groundline.mask_t import mask_t  # noqa: E402
 PATIENCE_S = 90
 URL = "udpm://239.255.76.67:7667?ttl=0"
 SKIPPED = 77
+STATES = ("starting", "running", "stalled", "stopping")
 VERDICTS = ("blind", "degraded", "trusted")
 FRAMES = pathlib.Path("/w/frames")  # left/, right/, jpeg/, calib.txt: what frames.cpp rendered
 SIZE = (320, 240)
@@ -108,11 +109,11 @@ class Daemon(Program):
         expect(status == 0, f"the daemon ended with status {status} after SIGTERM")
 
     def resources(self):
-        """Threads, descriptors, resident memory in kB."""
+        """Threads, descriptors, memory taken and memory resident in kB."""
         status = dict(line.split(":", 1) for line in
                       pathlib.Path(f"/proc/{self.process.pid}/status").read_text().splitlines())
         descriptors = len(os.listdir(f"/proc/{self.process.pid}/fd"))
-        return int(status["Threads"]), descriptors, int(status["VmRSS"].split()[0])
+        return int(status["Threads"]), descriptors, int(status["VmData"].split()[0]), int(status["VmRSS"].split()[0])
 
 
 class Radio(Program):
@@ -195,7 +196,7 @@ def told(health):
     if health is None:
         return "none"
     some = ", ".join(f"{name} {value}" for name, value in counters(health).items() if value > 0)
-    return f"state {health.state}, {VERDICTS[health.verdict]}, reasons {health.reasons:#x}, {some}"
+    return f"{STATES[health.state]}, {VERDICTS[health.verdict]}, reasons {health.reasons:#x}, {some}"
 
 
 def need_driver(name):

@@ -22,7 +22,7 @@ HERE = pathlib.Path(__file__).resolve().parent
 CASES = HERE / "cases"
 CASE_LIMIT_S = 420  # for one that hangs
 SKIPPED = 77
-SCENE = "drive?width=320&height=240&focal=250&boxes=2&seed=7"
+SCENE = "drive?width=320&height=240&focal=250&boxes=2&seed=7&frames=130"
 FRAMES = 130
 
 
@@ -53,9 +53,9 @@ def make_image(folder, packages):
     return image
 
 
-def make_shared(shared, programs):
+def make_shared(shared, programs, frames):
     """What the machine sees as /w: the programs, the cases, message types for Python, rendered frames."""
-    groundline, _, frames = programs
+    shutil.rmtree(shared / "bin", ignore_errors=True)
     (shared / "bin").mkdir(parents=True, exist_ok=True)
     for program in programs:
         shutil.copy2(program, shared / "bin")
@@ -70,7 +70,7 @@ def make_shared(shared, programs):
         (shared / f"frames/{render}").touch()
     # The masks of this machine's own processor, for the case that compares them with the emulated one's.
     shutil.rmtree(shared / "replayed", ignore_errors=True)
-    subprocess.run([groundline, "replay", f"synthetic:{SCENE}", "--frames", "3", "--quiet", "--out", shared / "replayed"],
+    subprocess.run([programs[0], "replay", f"synthetic:{SCENE}", "--frames", "2", "--quiet", "--out", shared / "replayed"],
                    check=True)
 
 
@@ -108,12 +108,13 @@ def main():
     shutil.rmtree(out, ignore_errors=True)
     out.mkdir(parents=True)
     programs = [build / "src/cli/groundline", build / "src/daemon/groundlined"]
+    programs += (build / "src/daemon").glob("groundline-*.so")  # drivers that are loaded
     try:
         image = make_image(folder, runtime_packages(programs))
     except subprocess.CalledProcessError:
         sys.exit("The image of the virtual robot cannot be made; the lines above say why.")
     shared = folder / "shared"
-    make_shared(shared, [*programs, build / "tests/vm_frames"])
+    make_shared(shared, programs, build / "tests/vm_frames")
     robot = machine.Machine(image)
     try:
         if took_s := robot.prepare():

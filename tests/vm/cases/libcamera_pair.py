@@ -9,6 +9,7 @@ def case(stack):
     robot.command("udevadm", "settle")
     radio = robot.Radio(stack)
     settings = robot.camera_settings("platform/vimc.0 Sensor B", "platform/vimc.1 Sensor B", capture_driver="libcamera",
+                                     capture_width=318,  # vimc scales to multiples of 6
                                      capture_pair__tolerance__ms=1000)
     daemon = robot.Daemon(stack, **settings)
     health = radio.wait_running(pairs=5)
