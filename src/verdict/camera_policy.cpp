@@ -24,6 +24,7 @@ void give_up(CameraStep& step, CameraState state, std::int64_t now_ns, const Cam
     CameraLife& life = step.life;
     step.action = CameraAction::kClose;  // also after a failed opening, which may have got half way
     life.state = state;
+    if (state == CameraState::kAbsent) life.failures = 0;
     life.retry_ns = now_ns + (state == CameraState::kAbsent
                                   ? wait_after(++life.absences, limits.longest_absent_retry_ns, limits)
                                   : wait_after(++life.failures, limits.longest_retry_ns, limits));
@@ -66,7 +67,9 @@ void on_picture(CameraStep& step, int eye, std::int64_t now_ns, const CameraLimi
         life.silent_eye = -1;
         tell(step);
     }
-    if (life.state == CameraState::kRunning && now_ns - life.since_ns >= limits.steady_ns) life.failures = 0;
+    const std::int64_t both_until_ns = std::min(life.picture_ns[0], life.picture_ns[1]);
+    if (life.state == CameraState::kRunning && both_until_ns - life.since_ns >= limits.steady_ns)
+        life.failures = 0;
 }
 
 }  // namespace

@@ -39,8 +39,9 @@ struct CameraLimits {
     std::int64_t first_retry_ns = 250'000'000;
     std::int64_t longest_absent_retry_ns = 1'000'000'000;
     std::int64_t longest_retry_ns = 4'000'000'000;
-    // Running this long forgives all failures.
-    std::int64_t steady_ns = 10'000'000'000;
+    // Good pictures of both eyes for this long forgive all failures: what an opening was good for. Less, and
+    // a device that dies as soon as it runs would be opened four times a second for ever.
+    std::int64_t steady_ns = 1'000'000'000;
 };
 
 enum class CameraAction : std::uint8_t {
@@ -79,7 +80,7 @@ struct CameraLife {
     CameraFault fault = CameraFault::kNone;  // of the last failure
     int silent_eye = -1;                     // of the last stall
     int absences = 0;                        // times it was not there, since it last was
-    int failures = 0;                        // other faults and stalls, since it last ran steadily
+    int failures = 0;                        // other faults and stalls, since it ran steadily or was gone
     std::int64_t since_ns = 0;               // with kStarting and kRunning: when that began
     std::int64_t retry_ns = 0;               // closed: when to open
     std::array<bool, 2> seen{};              // since the start
@@ -99,7 +100,9 @@ struct CameraStep {
 // - A stall is seen only at a tick: whoever calls takes first what the devices have ready, so that a caller
 // that was
 //   itself held up finds no stall.
-// - Every fault and stall leads to kClose, then, after a wait, to kOpen: nothing is mended half.
+// - Every fault and stall leads to kClose, then, after a wait, to kOpen: nothing is mended half. After steady
+//   running the wait is the first and shortest, whatever the fault: an unplugged camera may say anything.
+//   Found absent, a device is another one when it is back, without failures.
 // - News are kRunning, faults and stalls; the same as last told are not told again, so that a device that
 // stays away is
 //   one line.

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <random>
+#include <utility>
 #include <vector>
 
 namespace groundline::verdict {
@@ -156,7 +157,7 @@ TEST(CameraPolicy, AfterALongAbsenceTheFirstFailureIsTriedAgainSoon) {
          life);
 }
 
-TEST(CameraPolicy, OnlySteadyRunningForgivesFailures) {
+TEST(CameraPolicy, OnlySteadyRunningOfBothEyesForgivesFailures) {
     const std::vector<Row> fails = {
         {5000, CameraEvent::failed(Fault::kFailed), State::kBackingOff, Action::kClose, true},
         {5250, kTick, State::kBackingOff, Action::kOpen},
@@ -166,8 +167,63 @@ TEST(CameraPolicy, OnlySteadyRunningForgivesFailures) {
         {6000, CameraEvent::picture(2), State::kRunning, Action::kNone, true}};
     const CameraLife life = play(fails, play(started()));
     EXPECT_EQ(life.failures, 2);
-    EXPECT_EQ(play({{15'999, CameraEvent::picture(2), State::kRunning}}, life).failures, 2);
-    EXPECT_EQ(play({{16'000, CameraEvent::picture(2), State::kRunning}}, life).failures, 0);
+    EXPECT_EQ(play({{6999, CameraEvent::picture(2), State::kRunning}}, life).failures, 2);
+    EXPECT_EQ(play({{7000, CameraEvent::picture(0), State::kRunning}}, life).failures, 2);
+    EXPECT_EQ(play({{7000, CameraEvent::picture(2), State::kRunning}}, life).failures, 0);
+    // What dies as soon as it runs is left alone for longer and longer.
+    play({{6500, CameraEvent::failed(Fault::kFailed), State::kBackingOff, Action::kClose, true},
+          {7499, kTick, State::kBackingOff},
+          {7500, kTick, State::kBackingOff, Action::kOpen}},
+         life);
+}
+
+TEST(CameraPolicy, AnAbsenceForgivesFailures) {
+    CameraLife life;
+    for (int i = 0; i < 5; ++i)
+        life = step(life, CameraEvent::failed(Fault::kFailed), i * 1000 * kMs, kLimits).life;
+    EXPECT_EQ(life.failures, 5);
+    play({{5000, CameraEvent::failed(Fault::kAbsent), State::kAbsent, Action::kClose, true},
+          {5250, kTick, State::kAbsent, Action::kOpen},
+          {5250, CameraEvent::failed(Fault::kRefused), State::kBackingOff, Action::kClose, true},
+          {5499, kTick, State::kBackingOff},
+          {5500, kTick, State::kBackingOff, Action::kOpen}},
+         life);
+}
+
+// An unplugged camera that says "input/output error" instead of "no such device", and may do so once more
+// when it is opened; ten times, with 5 s of pictures between.
+TEST(CameraPolicy, EachOfTenReplugsIsLookedForWithinASecondWhateverTheFaultWas) {
+    for (const bool dies_slowly : {false, true}) {
+        for (const std::int64_t away_ms : {100, 300, 1300, 2700, 6000}) {
+            CameraLife life = play(started());
+            std::int64_t now_ms = 60;
+            const auto happens = [&](const CameraEvent& event) {
+                const CameraStep next = step(life, event, now_ms * kMs, kLimits);
+                life = next.life;
+                return next.action;
+            };
+            for (int replug = 0; replug < 10; ++replug) {
+                for (const std::int64_t end_ms = now_ms + 5000; now_ms < end_ms; now_ms += 33)
+                    happens(CameraEvent::picture(2));
+                const std::int64_t back_ms = now_ms + away_ms;
+                bool failed_again = !dies_slowly;
+                ASSERT_EQ(happens(CameraEvent::failed(Fault::kFailed)), Action::kClose);
+                for (;;) {
+                    const bool opens = happens(kTick) == Action::kOpen;
+                    if (opens && now_ms >= back_ms) break;
+                    if (opens)
+                        happens(CameraEvent::failed(std::exchange(failed_again, true) ? Fault::kAbsent
+                                                                                      : Fault::kFailed));
+                    now_ms += 10;
+                    ASSERT_LE(now_ms, back_ms + 1000) << "replug " << replug << ", away " << away_ms;
+                }
+                happens(kOpened);
+                now_ms += 500;
+                happens(CameraEvent::picture(2));
+                ASSERT_EQ(life.state, State::kRunning);
+            }
+        }
+    }
 }
 
 TEST(CameraPolicy, WhatComesFromAClosedDeviceMeansNothing) {
