@@ -23,7 +23,7 @@ constexpr std::int64_t kExposurePairs = 15;
 constexpr std::int64_t kStepQuietNs = 5'000'000'000;
 // Mean and saturation are taken from every so many rows, which costs microseconds.
 constexpr int kMeasuredRows = 8;
-constexpr std::array<const char*, 3> kEyeNames = {"the left camera", "the right camera", "no camera"};
+constexpr std::array<const char*, 2> kEyeNames = {"the left camera", "the right camera"};
 
 class RealSourceClock final : public SourceClock {
   public:
@@ -159,7 +159,11 @@ void CameraSource::admit(const CameraFrame& frame) {
         driver_->release(frame);
         return;
     }
-    apply(CameraEvent::picture(static_cast<int>(frame.eye)));
+    // Out of step nothing is unpacked, so nothing is known to be unusable.
+    const bool usable = both                     ? !unusable_[0] && !unusable_[1]
+                        : pairing_.out_of_step() ? true
+                                                 : !unusable_[static_cast<std::size_t>(frame.eye)];
+    if (usable) apply(CameraEvent::picture(static_cast<int>(frame.eye)));
     if (!both) {
         hold_back(frame);
         return;
@@ -225,8 +229,18 @@ Pull CameraSource::deliver(StereoFrame& frame) {
         if (pairs_ % kExposurePairs == 0 && !config_.side_by_side) follow_exposure();
         ++pairs_;
     }
+    look_at_unpacked(pull);
     publish();
     return pull;
+}
+
+void CameraSource::look_at_unpacked(Pull pull) {
+    if (pull == Pull::kBad) {
+        apply(CameraEvent::tick());
+        return;
+    }
+    for (std::size_t eye = 0; eye < 2; ++eye)
+        if (std::exchange(unusable_[eye], false)) apply(CameraEvent::picture(static_cast<int>(eye)));
 }
 
 Pull CameraSource::copy_pair(const CameraFrame& left, const CameraFrame& right, StereoFrame& frame) {
@@ -243,8 +257,13 @@ Pull CameraSource::copy_pair(const CameraFrame& left, const CameraFrame& right, 
                   static_cast<long long>(right.sequence));
     stamp.set_name(name.data());
     Fault fault = driver_->copy(left, Eye::kLeft, frame.left);
-    if (fault.ok()) fault = driver_->copy(right, Eye::kRight, frame.right);
+    std::size_t eye = 0;
+    if (fault.ok()) {
+        fault = driver_->copy(right, Eye::kRight, frame.right);
+        eye = 1;
+    }
     if (fault.ok()) return Pull::kFrame;
+    unusable_[eye] = true;
     status_.last_fault = fault.sentence;
     error_.assign(fault.sentence.view());
     return Pull::kBad;
@@ -296,6 +315,19 @@ void CameraSource::on_fault(const Fault& fault) {
     apply(CameraEvent::failed(fault.kind));
 }
 
+Sentence CameraSource::stall_sentence() const {
+    const int eye = life_.silent_eye;
+    const char* who = config_.side_by_side ? "the stereo camera"
+                      : eye == 2           ? "both cameras"
+                                           : kEyeNames[static_cast<std::size_t>(eye)];
+    const bool unusable = eye == 2 ? unusable_[0] || unusable_[1] : unusable_[static_cast<std::size_t>(eye)];
+    return unusable ? Sentence::of(
+                          "%s gave no picture that can be used for too long; closed, to be opened "
+                          "again; the last was: %s",
+                          who, error_.c_str())
+                    : Sentence::of("%s gave no picture for too long; closed, to be opened again", who);
+}
+
 void CameraSource::apply(const CameraEvent& event) {
     const verdict::CameraStep step = verdict::step(life_, event, clock_.mono_ns(), config_.limits);
     const bool was_open = !life_.closed();
@@ -308,10 +340,7 @@ void CameraSource::apply(const CameraEvent& event) {
         }
     }
     if (life_.state == CameraState::kStalled && step.action == CameraAction::kClose) {
-        const int eye = life_.silent_eye;
-        status_.last_fault =
-            Sentence::of("%s gave no picture for too long; closed, to be opened again",
-                         eye == 2 ? "neither camera" : kEyeNames[static_cast<std::size_t>(eye)]);
+        status_.last_fault = stall_sentence();
     }
     if (!step.say) return;
     if (life_.state == CameraState::kRunning)
@@ -323,7 +352,11 @@ void CameraSource::apply(const CameraEvent& event) {
 // The driver takes all buffers back by itself.
 void CameraSource::close_devices() {
     drop(pairing_.reset(), false);
-    both_.reset();
+    if (both_) {
+        ++status_.superseded;
+        counters_.add(Count::kCameraSuperseded);
+        both_.reset();
+    }
     status_.out_of_step = false;
     out_of_step_told_ = false;
     on_device([&] { driver_->close(); });

@@ -43,9 +43,10 @@ struct CameraStatus {
     std::array<std::int64_t, 2> gaps{};      // missing by the devices' own numbers
     std::array<std::int64_t, 2> damaged{};   // said so by the devices
     std::int64_t singles = 0;                // pictures without one of the other eye
-    std::int64_t superseded = 0;             // pairs that a newer one replaced before anybody took them
-    std::int64_t left_out = 0;               // stale or empty buffers after a start
-    std::int64_t restarts = 0;               // closed for a fault or a stall
+    std::int64_t superseded =
+        0;                      // pairs nobody took: a newer one replaced them, or a fault closed the camera
+    std::int64_t left_out = 0;  // stale or empty buffers after a start
+    std::int64_t restarts = 0;  // closed for a fault or a stall
     double skew_ms =
         std::numeric_limits<double>::quiet_NaN();  // right minus left; how far apart while out of step
     double drift_ppm =
@@ -127,11 +128,13 @@ class CameraSource final : public FrameSource {
     void drop(const Pairing::DroppedFrames& dropped, bool give_back);
     bool has_pair();
     Pull deliver(StereoFrame& frame);
+    void look_at_unpacked(Pull pull);
     Pull copy_pair(const CameraFrame& left, const CameraFrame& right, StereoFrame& frame);
     void measure(const StereoFrame& frame);
     void follow_exposure();
     void look_at_step();
     void on_fault(const Fault& fault);
+    Sentence stall_sentence() const;
     void apply(const verdict::CameraEvent& event);
     void close_devices();
     // Does `call` on the driver while in_device_call() is true.
@@ -164,8 +167,10 @@ class CameraSource final : public FrameSource {
     std::array<bool, kMostHeld> holds_{};
     std::optional<FramePair> pair_;    // taken from the pairing, tokens into held_
     std::optional<CameraFrame> both_;  // the newest side-by-side picture
-    std::int64_t pairs_ = 0;           // handed out
-    std::int64_t left_out_seen_ = 0;   // of the driver, counted already
+    // The eye's last picture could not be unpacked: what comes is no sign of life until one can be again.
+    std::array<bool, 2> unusable_{};
+    std::int64_t pairs_ = 0;          // handed out
+    std::int64_t left_out_seen_ = 0;  // of the driver, counted already
     bool out_of_step_told_ = false;
     std::int64_t step_quiet_until_ns_ = 0;
     bool follows_ = false;

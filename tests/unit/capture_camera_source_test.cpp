@@ -100,6 +100,7 @@ class SimulatedCameras final : public CameraDriver {
             const std::int64_t due = first >= 0 ? due_ns(first) : std::numeric_limits<std::int64_t>::max();
             if (due <= world_.now_ns) {
                 if (!take(first, frame)) continue;
+                breaks = std::exchange(breaks_after_next, {});
                 return Waited::kFrame;
             }
             if (world_.now_ns >= deadline_ns) return Waited::kNothing;
@@ -148,6 +149,7 @@ class SimulatedCameras final : public CameraDriver {
     Fault answer_to_start;
     Fault answer_to_exposure;
     Fault breaks;
+    Fault breaks_after_next;  // picture
     std::int64_t start_takes_ms = 0;
     int buffers = 6;
     int opened = 0;
@@ -363,7 +365,7 @@ TEST(CameraSource, AWriterThatDiesIsAStallAndIsTriedAgain) {
     EXPECT_EQ(robot.source->status().fault, CameraFault::kNone);
     EXPECT_FALSE(robot.cameras->is_open());
     ASSERT_EQ(robot.notices.size(), 2U);
-    EXPECT_EQ(robot.notices[1], "- neither camera gave no picture for too long; closed, to be opened again");
+    EXPECT_EQ(robot.notices[1], "- both cameras gave no picture for too long; closed, to be opened again");
     robot.run_until(7.5);
     EXPECT_EQ(robot.source->status().state, State::kStarting) << "opened again, with the longer limit now";
     robot.run_until(17.0);
@@ -483,6 +485,53 @@ TEST(CameraSource, APictureThatCannotBeUnpackedIsABadPairWithASentence) {
     EXPECT_GT(robot.pairs, 25);
 }
 
+TEST(CameraSource, ACameraThatGivesNothingUsableIsOpenedAgain) {
+    for (const bool side_by_side : {false, true}) {
+        Robot robot(side_by_side);
+        robot.world.at(2.0, [&] { robot.cameras->eyes[1].unusable = true; });
+        robot.run_until(3.9);
+        EXPECT_EQ(robot.count(Count::kCameraRestarts), 0U);
+        robot.run_until(4.2);
+        EXPECT_EQ(robot.count(Count::kCameraRestarts), 1U);
+        ASSERT_EQ(robot.notices.size(), 2U);
+        EXPECT_EQ(robot.notices[1],
+                  std::string("- ") + (side_by_side ? "the stereo camera" : "the right camera") +
+                      " gave no picture that can be used for too long; closed, to be opened again; the last "
+                      "was: a picture is cut short");
+        // It is given its time to start, as one that gives nothing is, and told once.
+        robot.run_until(60.0);
+        EXPECT_GE(robot.count(Count::kCameraRestarts), 4U);
+        EXPECT_LE(robot.count(Count::kCameraRestarts), 8U);
+        EXPECT_EQ(robot.notices.size(), 2U);
+        EXPECT_NE(robot.source->status().state, State::kRunning);
+        robot.cameras->eyes[1].unusable = false;
+        robot.run_until(66.0);
+        EXPECT_GT(robot.pairs_in(64.5, 66.0), 40);
+        EXPECT_EQ(robot.source->status().state, State::kRunning);
+        EXPECT_EQ(robot.notices.size(), 3U);
+    }
+}
+
+TEST(CameraSource, BadPicturesHereAndThereAreNoStall) {
+    Robot robot;
+    for (int i = 0; i < 40; ++i) {
+        robot.world.at(1.0 + 0.5 * i, [&, i] { robot.cameras->eyes[i % 2].unusable = true; });
+        robot.world.at(1.4 + 0.5 * i, [&, i] { robot.cameras->eyes[i % 2].unusable = false; });
+    }
+    robot.run_until(22.0);
+    EXPECT_GT(robot.bad, 400);
+    EXPECT_EQ(robot.count(Count::kCameraRestarts), 0U);
+}
+
+TEST(CameraSource, UnusableAndThenOutOfStepIsNotSilent) {
+    Robot robot;
+    robot.world.at(2.0, [&] { robot.cameras->eyes[1].unusable = true; });
+    robot.world.at(3.0, [&] { robot.cameras->eyes[1].phase_ms = 16.0; });
+    robot.run_until(10.0);
+    EXPECT_EQ(robot.count(Count::kCameraRestarts), 0U);
+    EXPECT_TRUE(robot.source->status().out_of_step);
+}
+
 TEST(CameraSource, ASlowReaderGetsTheNewestPairAndTheRestIsCounted) {
     Robot robot;
     robot.run_until(10.0, 200);  // 5 pairs a second of 30
@@ -537,6 +586,23 @@ TEST(CameraSource, SideBySideEachPictureIsAPair) {
     robot.cameras->eyes[0].delivers = false;
     robot.run_until(9.0);
     EXPECT_EQ(robot.count(Count::kCameraRestarts), 1U);
+    ASSERT_EQ(robot.notices.size(), 2U);
+    EXPECT_EQ(robot.notices[1],
+              "- the stereo camera gave no picture for too long; closed, to be opened again");
+}
+
+TEST(CameraSource, APictureSideBySideThatAFaultOvertakesIsCounted) {
+    Robot robot(true);
+    robot.run_until(2.0);
+    const auto accounted = [&] {
+        return robot.pairs + static_cast<std::int64_t>(robot.count(Count::kCameraSuperseded));
+    };
+    EXPECT_EQ(accounted(), robot.cameras->eyes[0].next);
+    robot.cameras->breaks_after_next = kGone;
+    robot.run_until(2.1);
+    EXPECT_EQ(robot.count(Count::kCameraRestarts), 1U);
+    EXPECT_EQ(accounted(), robot.cameras->eyes[0].next);
+    EXPECT_EQ(robot.source->status().superseded, 1);
 }
 
 TEST(CameraSource, TheRightCameraFollowsTheLeftOnesExposure) {
