@@ -17,8 +17,10 @@ using verdict::CameraState;
 
 constexpr double kNsPerMs = 1e6;
 constexpr std::int64_t kNoWait = 0;  // a deadline long past
-// Every so many pairs the cameras are asked what they expose: a control costs a millisecond on USB.
-constexpr std::int64_t kExposurePairs = 15;
+// How often the cameras are asked what they expose, four controls of a millisecond each on USB: for people,
+// and where the right one follows: an automatic takes about a second to settle.
+constexpr std::int64_t kExposureLookNs = 1'000'000'000;
+constexpr std::int64_t kExposureFollowNs = 500'000'000;
 // Cameras at the edge of the tolerance go in and out of step by the second; the log need not.
 constexpr std::int64_t kStepQuietNs = 5'000'000'000;
 // Mean and saturation are taken from every so many rows, which costs microseconds.
@@ -88,6 +90,8 @@ CameraSource::~CameraSource() {
 }
 
 Pull CameraSource::next(StereoFrame& frame) {
+    // Here no pair is kept waiting: the last is with whoever asked, the next is on its way.
+    look_at_exposure();
     const std::int64_t deadline_ns = clock_.mono_ns() + kLongestWaitNs;
     for (;;) {
         if (life_.closed()) {
@@ -112,6 +116,8 @@ void CameraSource::open_devices() {
     left_out_seen_ = 0;
     out_of_step_told_ = false;
     follow_ = {};
+    handed_over_ = false;
+    exposure_look_ns_ = 0;
     follows_ = config_.follow_exposure && !config_.side_by_side;
     Fault fault = on_device([&] { return driver_->open(); });
     if (fault.ok()) {
@@ -226,8 +232,8 @@ Pull CameraSource::deliver(StereoFrame& frame) {
     }
     if (pull == Pull::kFrame) {
         measure(frame);
-        if (pairs_ % kExposurePairs == 0 && !config_.side_by_side) follow_exposure();
         ++pairs_;
+        handed_over_ = true;
     }
     look_at_unpacked(pull);
     publish();
@@ -278,7 +284,11 @@ void CameraSource::measure(const StereoFrame& frame) {
     status_.drift_ppm = config_.side_by_side ? status_.drift_ppm : pairing_.drift_ppm();
 }
 
-void CameraSource::follow_exposure() {
+void CameraSource::look_at_exposure() {
+    const bool handed_over = std::exchange(handed_over_, false);
+    const std::int64_t now_ns = clock_.mono_ns();
+    if (!handed_over || config_.side_by_side || now_ns < exposure_look_ns_) return;
+    exposure_look_ns_ = now_ns + (follows_ ? kExposureFollowNs : kExposureLookNs);
     const auto [left, right] = on_device(
         [&] { return std::pair(driver_->read_exposure(Eye::kLeft), driver_->read_exposure(Eye::kRight)); });
     status_.exposure_difference_ms = (right.exposure_us - left.exposure_us) / 1000.0;

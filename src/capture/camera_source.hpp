@@ -131,7 +131,7 @@ class CameraSource final : public FrameSource {
     void look_at_unpacked(Pull pull);
     Pull copy_pair(const CameraFrame& left, const CameraFrame& right, StereoFrame& frame);
     void measure(const StereoFrame& frame);
-    void follow_exposure();
+    void look_at_exposure();
     void look_at_step();
     void on_fault(const Fault& fault);
     Sentence stall_sentence() const;
@@ -173,6 +173,8 @@ class CameraSource final : public FrameSource {
     std::int64_t left_out_seen_ = 0;  // of the driver, counted already
     bool out_of_step_told_ = false;
     std::int64_t step_quiet_until_ns_ = 0;
+    bool handed_over_ = false;           // a pair, by the last next()
+    std::int64_t exposure_look_ns_ = 0;  // when to ask the cameras again what they expose
     bool follows_ = false;
     verdict::FollowState follow_;
     CameraStatus status_;

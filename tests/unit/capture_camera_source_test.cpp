@@ -109,6 +109,7 @@ class SimulatedCameras final : public CameraDriver {
         }
     }
     Fault copy(const CameraFrame& frame, Eye eye, Luma into) override {
+        meet("copy");
         EXPECT_EQ(held_.count({static_cast<int>(frame.eye), frame.buffer}), 1U) << "copied what is not held";
         if (eyes[static_cast<std::size_t>(eye)].unusable)
             return {CameraFault::kFailed, Sentence("a picture is cut short")};
@@ -155,7 +156,7 @@ class SimulatedCameras final : public CameraDriver {
     int opened = 0;
     int closed = 0;
     int exposure_commands = 0;
-    std::function<void(const char*)> on_call;  // sees each call that may take its time, and wait()
+    std::function<void(const char*)> on_call;  // sees each call that may take its time, wait() and copy()
 
   private:
     void meet(const char* call) const {
@@ -641,10 +642,32 @@ TEST(CameraSource, SaysWhileADeviceMayTakeItsTime) {
     EXPECT_FALSE(robot.source->in_device_call());
     robot.cameras->on_call = nullptr;
     const std::set<bool> always = {true};
-    const std::map<std::string, std::set<bool>> wanted = {{"open", always},          {"start", always},
-                                                          {"close", always},         {"set exposure", always},
-                                                          {"read exposure", always}, {"wait", {false}}};
+    const std::map<std::string, std::set<bool>> wanted = {
+        {"open", always},          {"start", always}, {"close", always}, {"set exposure", always},
+        {"read exposure", always}, {"wait", {false}}, {"copy", {false}}};
     EXPECT_EQ(seen, wanted);
+}
+
+TEST(CameraSource, NoPairWaitsForALookAtTheExposure) {
+    for (const bool follow : {false, true}) {
+        Robot robot(false, follow);
+        robot.run_until(2.0);
+        int looks = 0;
+        bool copied = false;
+        robot.cameras->on_call = [&](const char* call) {
+            const std::string_view name = call;
+            copied = copied || name == "copy";
+            if (name != "read exposure") return;
+            ++looks;
+            EXPECT_FALSE(copied) << "a pair was kept back";
+        };
+        while (robot.world.seconds() < 12.0) {
+            copied = false;
+            robot.source->next(robot.frame);
+        }
+        EXPECT_NEAR(looks / 2, follow ? 20 : 10, 1);
+        robot.cameras->on_call = nullptr;
+    }
 }
 
 TEST(CameraSource, AFailedStartIsClosedAndBackedOff) {
