@@ -112,9 +112,9 @@ class Reading {
 };
 
 std::string listed(const std::vector<libcamera::PixelFormat>& formats) {
-    std::vector<std::string> names;
-    for (const libcamera::PixelFormat& format : formats)
-        names.push_back(format.toString());
+    std::vector<std::string> names(formats.size());
+    std::transform(formats.begin(), formats.end(), names.begin(),
+                   [](const libcamera::PixelFormat& format) { return format.toString(); });
     return names.empty() ? "none" : fmt::format("{}", fmt::join(names, " "));
 }
 
@@ -428,9 +428,9 @@ Fault LibcameraDriver::open_cameras() {
         return {CameraFault::kFailed, Sentence::of("libcamera does not start: %s", std::strerror(-error))};
     manager_->started = true;
     const std::vector<std::shared_ptr<libcamera::Camera>> at_hand = manager_->cameras.cameras();
-    std::vector<std::string> ids;
-    for (const auto& camera : at_hand)
-        ids.push_back(camera->id());
+    std::vector<std::string> ids(at_hand.size());
+    std::transform(at_hand.begin(), at_hand.end(), ids.begin(),
+                   [](const auto& camera) { return camera->id(); });
     std::vector<std::string> said;
     std::string first_id;
     for (const auto& camera : cameras_) {
