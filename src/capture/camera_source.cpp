@@ -298,8 +298,10 @@ void CameraSource::look_at_exposure() {
     if (!step.set) return;
     const Fault fault = on_device([&] { return driver_->set_exposure(Eye::kRight, *step.set); });
     if (fault.ok()) return;
-    follows_ = false;  // until it is opened again
     status_.last_fault = fault.sentence;
+    // What became of the device, the next wait() tells; a camera that failed at this alone is asked again.
+    if (fault.kind != CameraFault::kRefused) return;
+    follows_ = false;  // until it is opened again
     tell(false, fault.sentence);
 }
 

@@ -56,6 +56,16 @@ const char* advice_for(int error) {
     }
 }
 
+// What a refused request says of the device, not of the value.
+bool device_failed(int error) {
+    return error == ENODEV || error == ENXIO || error == EIO || error == EPIPE || error == ETIMEDOUT;
+}
+
+// What goes for every other request as well. EIO and EPIPE do not: some cameras answer so to what they lack.
+bool device_lost(int error) {
+    return error == ENODEV || error == ENXIO || error == ETIMEDOUT;
+}
+
 v4l2_format format_request(PixelFormat format, int width, int height) {
     v4l2_format request{};
     request.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
@@ -103,7 +113,7 @@ Fault V4l2Device::fault_of(int error, const char* what) const {
                                          strerrordesc_np(error), advice_for(error))};
 }
 
-Fault V4l2Device::open(const std::string& path, const CameraSetup& setup, int width, int height) {
+Fault V4l2Device::open(const std::string& path) {
     close();
     path_ = path;
     dead_ = false;
@@ -116,8 +126,11 @@ Fault V4l2Device::open(const std::string& path, const CameraSetup& setup, int wi
         fd_ = -1;
         return fault_of(error, "cannot be opened");
     }
-    Fault result = check_capabilities();
-    if (result.ok()) result = choose_format(setup, width, height);
+    return check_capabilities();
+}
+
+Fault V4l2Device::set_up(const CameraSetup& setup, int width, int height) {
+    Fault result = choose_format(setup, width, height);
     if (result.ok()) result = set_controls(setup);
     if (result.ok()) result = take_buffers();
     return result;
@@ -202,7 +215,7 @@ Fault V4l2Device::choose_format(const CameraSetup& setup, int width, int height)
         if (setup.format ? format != *setup.format : listed && !offered[static_cast<std::size_t>(i)])
             continue;
         const std::optional<Offer> offer = try_format(format, setup, width, height, error, other);
-        if (error == EBUSY || error == ENODEV) return fault_of(error, "cannot be set up");
+        if (error == EBUSY || device_lost(error)) return fault_of(error, "cannot be set up");
         if (!offer) continue;
         if (!best || offer->rate_hz > best->rate_hz) best = offer;
         if (offer->rate_hz == 0.0 || offer->rate_hz >= kNearEnough * setup.rate_hz) {
@@ -210,6 +223,7 @@ Fault V4l2Device::choose_format(const CameraSetup& setup, int width, int height)
             break;
         }
     }
+    if (!best && other.empty() && device_failed(error)) return fault_of(error, "cannot be set up");
     if (!best) {
         const Sentence wanted = Sentence::of(
             "does not give %dx%d %s%s%s; set capture.width, capture.height and capture.format to what it "
@@ -227,11 +241,29 @@ Fault V4l2Device::choose_format(const CameraSetup& setup, int width, int height)
     return {};
 }
 
-bool V4l2Device::set_control(std::uint32_t id, std::int32_t value) {
+int V4l2Device::set_control(const Control& wanted) {
     v4l2_control control{};
-    control.id = id;
-    control.value = value;
-    return call(VIDIOC_S_CTRL, &control) >= 0;
+    control.id = wanted.id;
+    control.value = wanted.value;
+    return -std::min(0, call(VIDIOC_S_CTRL, &control));
+}
+
+Fault V4l2Device::prefer(std::initializer_list<Control> choices) {
+    for (const Control& choice : choices) {
+        const int error = set_control(choice);
+        if (device_lost(error)) return fault_of(error, "does not answer");
+        if (error == 0) break;
+    }
+    return {};
+}
+
+Fault V4l2Device::demand(std::initializer_list<Control> choices, const char* what, const char* advice) {
+    for (const Control& choice : choices) {
+        const int error = set_control(choice);
+        if (error == 0) return {};
+        if (device_failed(error)) return fault_of(error, what);
+    }
+    return fault(CameraFault::kRefused, Sentence::of("%s; %s", what, advice).c_str());
 }
 
 std::optional<std::int32_t> V4l2Device::control(std::uint32_t id) {
@@ -243,19 +275,21 @@ std::optional<std::int32_t> V4l2Device::control(std::uint32_t id) {
 
 Fault V4l2Device::set_controls(const CameraSetup& setup) {
     const auto flip = [&](std::uint32_t id, bool wanted) {
-        return set_control(id, wanted ? 1 : 0) || !wanted;
+        return wanted ? demand({{id, 1}}, "cannot flip its picture", "set capture.flip: none")
+                      : prefer({{id, 0}});
     };
     const bool both = setup.flip == Flip::kBoth;
-    if (!flip(V4L2_CID_HFLIP, both || setup.flip == Flip::kHorizontal) ||
-        !flip(V4L2_CID_VFLIP, both || setup.flip == Flip::kVertical))
-        return fault(CameraFault::kRefused, "cannot flip its picture; set capture.flip: none");
+    Fault result = flip(V4L2_CID_HFLIP, both || setup.flip == Flip::kHorizontal);
+    if (result.ok()) result = flip(V4L2_CID_VFLIP, both || setup.flip == Flip::kVertical);
     // What is left to the camera is given back to it: it keeps what an earlier run has set. Not every camera
     // has all of these, and with none of them it is automatic anyway.
-    if (!setup.exposure_us && !set_control(V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_APERTURE_PRIORITY))
-        (void)set_control(V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_AUTO);
-    if (!setup.gain) (void)set_control(V4L2_CID_AUTOGAIN, 1);
+    if (result.ok() && !setup.exposure_us)
+        result = prefer({{V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_APERTURE_PRIORITY},
+                         {V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_AUTO}});
+    if (result.ok() && !setup.gain) result = prefer({{V4L2_CID_AUTOGAIN, 1}});
     // Else some cameras lower their rate in the dark, each by itself.
-    (void)set_control(V4L2_CID_EXPOSURE_AUTO_PRIORITY, 0);
+    if (result.ok()) result = prefer({{V4L2_CID_EXPOSURE_AUTO_PRIORITY, 0}});
+    if (!result.ok()) return result;
     ExposureValues wanted;
     if (setup.exposure_us) wanted.exposure_us = *setup.exposure_us;
     if (setup.gain) wanted.gain = *setup.gain;
@@ -263,22 +297,23 @@ Fault V4l2Device::set_controls(const CameraSetup& setup) {
 }
 
 Fault V4l2Device::set_exposure(const ExposureValues& wanted) {
+    Fault result;
     if (!std::isnan(wanted.exposure_us)) {
-        (void)set_control(V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_MANUAL);
         const auto value = static_cast<std::int32_t>(std::lround(wanted.exposure_us / kExposureUnitUs));
-        if (!set_control(V4L2_CID_EXPOSURE_ABSOLUTE, std::max(1, value)))
-            return fault(CameraFault::kRefused,
-                         "does not take this exposure; set capture.exposure_us: auto and "
-                         "capture.follow_exposure: off");
+        result = prefer({{V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_MANUAL}});
+        if (result.ok())
+            result = demand({{V4L2_CID_EXPOSURE_ABSOLUTE, std::max(1, value)}}, "does not take this exposure",
+                            "set capture.exposure_us: auto and capture.follow_exposure: off");
     }
-    if (!std::isnan(wanted.gain)) {
-        (void)set_control(V4L2_CID_AUTOGAIN, 0);
+    if (result.ok() && !std::isnan(wanted.gain)) {
         const auto value = static_cast<std::int32_t>(std::lround(wanted.gain));
-        if (!set_control(V4L2_CID_GAIN, value) && !set_control(V4L2_CID_ANALOGUE_GAIN, value))
-            return fault(CameraFault::kRefused,
-                         "does not take this gain; set capture.gain: auto and capture.follow_exposure: off");
+        result = prefer({{V4L2_CID_AUTOGAIN, 0}});
+        if (result.ok())
+            result =
+                demand({{V4L2_CID_GAIN, value}, {V4L2_CID_ANALOGUE_GAIN, value}}, "does not take this gain",
+                       "set capture.gain: auto and capture.follow_exposure: off");
     }
-    return {};
+    return result;
 }
 
 ExposureValues V4l2Device::read_exposure() {

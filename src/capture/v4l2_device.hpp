@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <initializer_list>
 #include <optional>
 #include <span>
 #include <string>
@@ -39,10 +40,12 @@ class V4l2Device {
     V4l2Device(const V4l2Device&) = delete;
     V4l2Device& operator=(const V4l2Device&) = delete;
 
-    // Opens `path`, checks that it captures, sets format, size (`width` by `height` of the whole picture),
-    // rate, flip and exposure of `setup`, checks what came back, takes and maps buffers. Size, format and
-    // what `setup` asks by value must be met; of the rate the nearest is taken: see rate_hz().
-    Fault open(const std::string& path, const CameraSetup& setup, int width, int height);
+    // Opens `path` and checks that it captures; changes nothing on it.
+    Fault open(const std::string& path);
+    // Sets format, size (`width` by `height` of the whole picture), rate, flip and exposure of `setup`,
+    // checks what came back, takes and maps buffers. Size, format and what `setup` asks by value must be met;
+    // of the rate the nearest is taken: see rate_hz().
+    Fault set_up(const CameraSetup& setup, int width, int height);
     // Queues all buffers and streams.
     Fault start();
     enum class Dequeued : std::uint8_t { kPicture, kNothing, kFault };
@@ -73,6 +76,10 @@ class V4l2Device {
         void* memory = nullptr;
         std::size_t length = 0;
     };
+    struct Control {
+        std::uint32_t id = 0;
+        std::int32_t value = 0;
+    };
     struct Offer {
         PixelFormat format = PixelFormat::kGrey;
         std::uint32_t bytes_per_line = 0;
@@ -90,7 +97,12 @@ class V4l2Device {
     double set_rate(double rate_hz);
     Fault set_controls(const CameraSetup& setup);
     Fault take_buffers();
-    bool set_control(std::uint32_t id, std::int32_t value);
+    // 0, or the error.
+    int set_control(const Control& wanted);
+    // Sets the first of `choices` that the camera takes; it need not take any. A fault only if it is lost.
+    Fault prefer(std::initializer_list<Control> choices);
+    // As prefer(), but one must be taken: kRefused with `advice`, or what became of the device.
+    Fault demand(std::initializer_list<Control> choices, const char* what, const char* advice);
     std::optional<std::int32_t> control(std::uint32_t id);
 
     V4l2System& system_;

@@ -21,45 +21,59 @@ V4l2Driver::V4l2Driver(CameraSetup setup, V4l2System& system, V4l2Places places)
     }
 }
 
+// All devices are found and opened before any is changed: one that waits for its partner must stay free for
+// whoever else sets it up, as the writer of a loopback device does.
 Fault V4l2Driver::open() {
     told_by_wait_ = {};
     next_camera_ = 0;
     whole_sequence_ = -1;
     description_ = {};
+    Fault fault = open_devices();
+    if (fault.ok()) fault = set_up_devices();
+    if (!fault.ok()) close();
+    return fault;
+}
+
+Fault V4l2Driver::open_devices() {
+    std::array<std::string, 2> paths;
+    for (std::size_t i = 0; i < cameras_.size(); ++i) {
+        const Eye eye = cameras_[i]->eye;
+        const std::string& name = eye == Eye::kBoth   ? setup_.device
+                                  : eye == Eye::kLeft ? setup_.left
+                                                      : setup_.right;
+        const Fault fault = find_v4l2_device(name, places_, paths[i]);
+        if (!fault.ok()) return fault;
+    }
+    if (paths[0] == paths[1])
+        return {
+            CameraFault::kRefused,
+            Sentence::of("capture.left and capture.right are both %s; name two cameras", paths[0].c_str())};
+    for (std::size_t i = 0; i < cameras_.size(); ++i) {
+        const Fault fault = cameras_[i]->device.open(paths[i]);
+        if (!fault.ok()) return fault;
+    }
+    return {};
+}
+
+Fault V4l2Driver::set_up_devices() {
     const bool both = setup_.side_by_side();
     const int width = both ? 2 * setup_.width : setup_.width;
     std::array<char, 256> text{};
     int length = 0;
-    std::string first_path;
     for (const auto& camera : cameras_) {
-        const std::string& name = both                        ? setup_.device
-                                  : camera->eye == Eye::kLeft ? setup_.left
-                                                              : setup_.right;
-        std::string path;
-        Fault fault = find_v4l2_device(name, places_, path);
-        if (fault.ok() && path == first_path)
-            fault = {
-                CameraFault::kRefused,
-                Sentence::of("capture.left and capture.right are both %s; name two cameras", path.c_str())};
-        first_path = path;
         V4l2Device& device = camera->device;
-        if (fault.ok()) fault = device.open(path, setup_, width, setup_.height);
-        if (!fault.ok()) {
-            close();
-            return fault;
-        }
-        if (both && device.format() == PixelFormat::kY10P && setup_.width % 4 != 0) {
-            close();
+        const Fault fault = device.set_up(setup_, width, setup_.height);
+        if (!fault.ok()) return fault;
+        if (both && device.format() == PixelFormat::kY10P && setup_.width % 4 != 0)
             return {CameraFault::kRefused,
                     Sentence::of("%s: packed pixels come in fours; set capture.width to a multiple of 4",
-                                 path.c_str())};
-        }
+                                 device.path().c_str())};
         camera->pictures.assign(static_cast<std::size_t>(device.buffers()), {});
         if (length < static_cast<int>(text.size()))
             length += std::snprintf(text.data() + length, text.size() - static_cast<std::size_t>(length),
-                                    "%s%s (%s) %s %dx%d at %.4g Hz", length > 0 ? ", " : "", path.c_str(),
-                                    device.driver(), name_of(device.format()).data(), width, setup_.height,
-                                    device.rate_hz());
+                                    "%s%s (%s) %s %dx%d at %.4g Hz", length > 0 ? ", " : "",
+                                    device.path().c_str(), device.driver(), name_of(device.format()).data(),
+                                    width, setup_.height, device.rate_hz());
     }
     description_ = Sentence(text.data());
     if (both && cameras_[0]->device.format() == PixelFormat::kMjpeg)

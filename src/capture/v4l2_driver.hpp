@@ -40,6 +40,8 @@ class V4l2Driver final : public CameraDriver {
     };
     // The camera an eye's picture comes from.
     Camera& camera_of(Eye eye) { return *cameras_[eye == Eye::kRight && cameras_.size() == 2 ? 1 : 0]; }
+    Fault open_devices();
+    Fault set_up_devices();
     Waited take(Camera& camera, bool polled_error, CameraFrame& frame, Fault& fault);
     Fault copy_jpeg(Camera& camera, const CameraFrame& frame, Columns columns, Luma into);
 

@@ -628,6 +628,16 @@ TEST(CameraSource, TheRightCameraFollowsTheLeftOnesExposure) {
     EXPECT_EQ(unwilling.cameras->exposure_commands, 1) << "asked once for each opening";
     EXPECT_EQ(unwilling.notices, (Notices{"+ two simulated cameras", "- takes no exposure"}));
     EXPECT_GT(unwilling.pairs, 500);
+
+    Robot hindered(false, true);
+    hindered.cameras->answer_to_exposure = {CameraFault::kFailed, Sentence("does not answer")};
+    hindered.cameras->eyes[0].exposure = {9000, 20};
+    hindered.world.at(3.0, [&] { hindered.cameras->answer_to_exposure = {}; });
+    hindered.run_until(2.0);
+    EXPECT_EQ(hindered.source->status().last_fault.view(), "does not answer");
+    hindered.run_until(10.0);
+    EXPECT_EQ(hindered.cameras->eyes[1].exposure.exposure_us, 9000) << "asked again";
+    EXPECT_EQ(hindered.notices, Notices{"+ two simulated cameras"});
 }
 
 TEST(CameraSource, SaysWhileADeviceMayTakeItsTime) {

@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
+#include <deque>
 #include <filesystem>
 #include <fstream>
 
@@ -433,6 +435,67 @@ TEST(V4l2, ControlsAreSetOrTheirLackIsSaid) {
     EXPECT_TRUE(std::isnan(bare.driver.read_exposure(Eye::kRight).exposure_us));
 }
 
+TEST(V4l2, AControlTellsADeviceThatFailsFromAValueThatIsRefused) {
+    struct Case {
+        int error;
+        CameraFault kind;
+        const char* words;
+    };
+    for (const Case& c : {Case{EINVAL, CameraFault::kRefused, "set capture."},
+                          {ERANGE, CameraFault::kRefused, "set capture."},
+                          {EACCES, CameraFault::kRefused, "set capture."},
+                          {ENODEV, CameraFault::kAbsent, "No such device"},
+                          {ENXIO, CameraFault::kAbsent, "No such device"},
+                          {EIO, CameraFault::kFailed, "Input/output error"},
+                          {EPIPE, CameraFault::kFailed, "Broken pipe"},
+                          {ETIMEDOUT, CameraFault::kFailed, "timed out"}}) {
+        CameraSetup setup = two_cameras();
+        setup.exposure_us = 5000;
+        setup.gain = 16;
+        setup.flip = Flip::kBoth;
+        // The control that fails: horizontal flip, exposure, gain. Those between are not there.
+        for (const int at : {0, 4, 6}) {
+            Rig rig(setup);
+            rig.right().controls = {{V4L2_CID_HFLIP, 0},         {V4L2_CID_VFLIP, 0},
+                                    {V4L2_CID_EXPOSURE_AUTO, 3}, {V4L2_CID_EXPOSURE_ABSOLUTE, 1},
+                                    {V4L2_CID_AUTOGAIN, 1},      {V4L2_CID_GAIN, 0}};
+            rig.left().controls = rig.right().controls;
+            std::deque<int>& answers = rig.right().failures[VIDIOC_S_CTRL];
+            answers.assign(static_cast<std::size_t>(at), 0);
+            answers.push_back(c.error);
+            const Fault fault = rig.driver.open();
+            EXPECT_EQ(fault.kind, c.kind) << at << strerrordesc_np(c.error);
+            EXPECT_TRUE(contains(fault.sentence, c.words)) << at << fault.sentence.view();
+            EXPECT_TRUE(contains(fault.sentence, "right camera /dev/video2")) << fault.sentence.view();
+            EXPECT_EQ(contains(fault.sentence, "capture."), c.kind == CameraFault::kRefused);
+            rig.expect_all_given_back();
+        }
+    }
+    // What need not be taken: a camera that is lost takes seconds for each, one that answers is asked on.
+    for (const int error : {ENODEV, ETIMEDOUT, EIO, EPIPE, EINVAL}) {
+        Rig rig;
+        rig.right().failures[VIDIOC_S_CTRL].assign(4, error);
+        const bool lost = error == ENODEV || error == ETIMEDOUT;
+        EXPECT_EQ(rig.driver.open().ok(), !lost) << strerrordesc_np(error);
+        EXPECT_EQ(rig.right().failures[VIDIOC_S_CTRL].size(), lost ? 3U : 0U);
+        rig.expect_all_given_back();
+    }
+}
+
+TEST(V4l2, ADeviceThatWaitsForItsPartnerIsNotTouched) {
+    for (const bool output : {false, true}) {
+        Rig rig;
+        rig.right().node = output;
+        if (output) rig.right().capabilities = V4L2_CAP_VIDEO_OUTPUT | V4L2_CAP_STREAMING;
+        rig.left().failures[VIDIOC_S_FMT] = {0};  // is taken away when that is asked
+        EXPECT_EQ(rig.driver.open().kind, CameraFault::kAbsent);
+        EXPECT_EQ(rig.left().failures[VIDIOC_S_FMT].size(), 1U) << "its format was set";
+        EXPECT_TRUE(rig.left().buffers.empty()) << "its buffers were taken";
+        EXPECT_EQ(rig.left().fd, -1) << "it is still open";
+        rig.expect_all_given_back();
+    }
+}
+
 TEST(V4l2, EveryStepOfOpeningMayFailAndNothingStaysOpen) {
     struct Case {
         unsigned long request;
@@ -444,6 +507,9 @@ TEST(V4l2, EveryStepOfOpeningMayFailAndNothingStaysOpen) {
                           {VIDIOC_QUERYCAP, ENODEV, CameraFault::kAbsent, "No such device"},
                           {VIDIOC_S_FMT, EBUSY, CameraFault::kBusy, "another program uses it"},
                           {VIDIOC_S_FMT, ENODEV, CameraFault::kAbsent, "cannot be set up"},
+                          {VIDIOC_S_FMT, EIO, CameraFault::kFailed, "cannot be set up"},
+                          {VIDIOC_S_FMT, ETIMEDOUT, CameraFault::kFailed, "cannot be set up"},
+                          {VIDIOC_S_FMT, EINVAL, CameraFault::kRefused, "set capture.width"},
                           {VIDIOC_REQBUFS, EINVAL, CameraFault::kFailed, "gives no buffers"},
                           {VIDIOC_REQBUFS, EBUSY, CameraFault::kBusy, "gives no buffers"},
                           {VIDIOC_QUERYBUF, EIO, CameraFault::kFailed, "does not show its buffers"},
