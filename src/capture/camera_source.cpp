@@ -1,6 +1,7 @@
 #include "capture/camera_source.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <cstdio>
 #include <ctime>
@@ -77,6 +78,7 @@ CameraSource::CameraSource(CameraSourceConfig config, std::unique_ptr<CameraDriv
       counters_(counters),
       clock_(clock),
       pairing_(config_.pairing) {
+    assert(config_.side_by_side || unambiguous(config_.pairing.tolerance_ns, config_.rate_hz));
     info_.name = config_.name;
     info_.width = config_.width;
     info_.height = config_.height;

@@ -28,7 +28,7 @@ struct CameraSourceConfig {
     int height = 480;
     double rate_hz = 30.0;
     bool side_by_side = false;
-    PairingConfig pairing;
+    PairingConfig pairing;  // its tolerance unambiguous() at the rate
     verdict::CameraLimits limits;
     bool follow_exposure = false;  // the right camera takes the left one's; two devices only
     verdict::FollowLimits follow;

@@ -24,15 +24,23 @@ struct FramePair {
 };
 
 struct PairingConfig {
+    // Farthest apart that two stamps of one instant may be; at most half the period of the pictures, see
+    // unambiguous().
     std::int64_t tolerance_ns = 10'000'000;
     int max_waiting = 3;  // pictures of one eye that wait for the other, 1 to kMaxWaiting
 };
 
+// With a tolerance of more than half a period, a picture may be nearer to the next one of the other eye than
+// to its own, and which pairs come out depends on the order of arrival.
+constexpr bool unambiguous(std::int64_t tolerance_ns, double rate_hz) {
+    return 2.0 * static_cast<double>(tolerance_ns) * rate_hz <= 1e9;
+}
+
 // Pairs pictures as they come, keeps the newest pair, and says of every other picture why it is not in one.
 //
 // A picture is paired with the nearest one of the other eye that still waits and is within the tolerance, at
-// once: waiting for a nearer one would cost a period of latency, and with a tolerance below half a period
-// there is none. Each eye's stamps grow, so what lies before a pair can be in no later one: pairs never cross
+// once: waiting for a nearer one would cost a period of latency, and with an unambiguous() tolerance there
+// is none. Each eye's stamps grow, so what lies before a pair can be in no later one: pairs never cross
 // and never go back.
 //
 // Pure: no clock, no memory but its own; a function of the frames in their order.

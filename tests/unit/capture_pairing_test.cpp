@@ -216,6 +216,37 @@ TEST(Pairing, AnyInterleavingKeepsEveryPromise) {
     EXPECT_GT(pairs_seen, 3000U);
 }
 
+// A picture more than a tolerance from its partner, by jitter, pairs with no other one as long as the
+// tolerance is unambiguous; with a larger one it does.
+TEST(Pairing, UpToHalfAPeriodNoPictureTakesTheNextOnesPartner) {
+    constexpr double kRateHz = 60.0;
+    constexpr std::int64_t kPeriodNs = 16'666'667;
+    EXPECT_TRUE(unambiguous(kPeriodNs / 2 - kMs / 100, kRateHz));
+    EXPECT_FALSE(unambiguous(kPeriodNs / 2 + kMs / 100, kRateHz));
+    EXPECT_TRUE(unambiguous(10 * kMs, 30.0));
+    for (const std::int64_t tolerance_ns : {8 * kMs, 10 * kMs}) {
+        Pairing pairing({tolerance_ns, 3});
+        int crossed = 0;
+        int pairs = 0;
+        for (int i = 0; i < 100; ++i) {
+            // The right picture of an instant is 7.5 ms late, so 9.2 ms before the next left one; every fifth
+            // left one is lost.
+            const std::int64_t left_ns = i * kPeriodNs;
+            const std::int64_t right_ns = left_ns + 15 * kMs / 2;
+            for (const StampedFrame& frame : {StampedFrame{0, left_ns, i}, StampedFrame{1, right_ns, i}}) {
+                if (frame.eye == 0 && i % 5 == 0) continue;
+                pairing.add(frame);
+                const auto pair = pairing.take();
+                if (!pair) continue;
+                ++pairs;
+                crossed += pair->left.token != pair->right.token ? 1 : 0;
+            }
+        }
+        EXPECT_GE(pairs, 80);
+        EXPECT_EQ(crossed > 0, !unambiguous(tolerance_ns, kRateHz)) << crossed;
+    }
+}
+
 // Nothing lost, skew within the tolerance and well below half a period: all pictures pair, whichever comes
 // first.
 TEST(Pairing, InStepEveryPictureIsPaired) {
