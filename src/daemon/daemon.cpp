@@ -11,6 +11,7 @@
 #include <csignal>
 #include <optional>
 #include <thread>
+#include <utility>
 
 #include "core/arena.hpp"
 #include "core/counters.hpp"
@@ -63,6 +64,13 @@ int lanes_of(const settings::Settings& settings) {
     return settings.process.threads > 0 ? settings.process.threads : processors;
 }
 
+// Slow cameras are not silent between two pictures; the rest has the publisher's own limit.
+std::int64_t stale_after_ns(const SourceInfo& info) {
+    const std::int64_t least_ns = publish::LcmOptions().stale_after_ns;
+    if (!info.live || info.rate_hz <= 0.0) return least_ns;
+    return std::max(least_ns, static_cast<std::int64_t>(5e9 / info.rate_hz));
+}
+
 settings::Settings with_disparities(settings::Settings settings, const SourceInfo& info,
                                     const std::optional<rig::StereoCalibration>& calibration) {
     setup::choose_disparities(info.width, calibration ? calibration->disparities_hint : 0, settings);
@@ -80,7 +88,7 @@ struct Parts {
           real_time(settings.realtime),
           pool(lanes_of(settings), [this] { real_time.adopt(pipeline::ThreadRole::kProcessing); }),
           processor(setup::processor_config(settings, info(), false, arena), rectifier, pool, arena),
-          tracker(&counters, publish::LcmOptions().stale_after_ns),
+          tracker(&counters, stale_after_ns(info())),
           publisher(lcm_options(settings, counters, &tracker)),
           health(lcm_options(settings, counters)),
           sinks{{{&publisher, Stage::kPublish, false}}},
@@ -91,6 +99,7 @@ struct Parts {
     // The pipeline's run; on a thread of its own, which becomes the capture thread.
     void run(const std::atomic<bool>& stop) {
         pipeline::RunOptions options;
+        options.rest = settings.realtime.on;
         if (!info().live) {
             options.pace = pipeline::Pace::kStamps;
             options.stamp_when_due = true;
@@ -112,8 +121,8 @@ struct Parts {
         try {
             change = settings::reload(settings, read_settings(options));
             running.tune(tuning_of(change.settings));
-        } catch (const Refusal& refusal) {
-            log().error("the new configuration is refused, the old one stays in force: {}", refusal.what());
+        } catch (const std::exception& fault) {  // a Refusal, or a path that cannot even be looked at
+            log().error("the new configuration is refused, the old one stays in force: {}", fault.what());
             return;
         }
         settings = change.settings;
@@ -167,23 +176,51 @@ bool wait_for(const std::atomic<bool>& done) {
     return done.load();
 }
 
-// From now on the program ends in time whatever hangs: a camera, the network, the journal.
-void arm_deadline() {
+// From now on the program ends in time, with that status, whatever hangs: a camera, the network, the journal.
+void arm_deadline(ExitStatus status) {
+    static std::atomic<int> known{0};
+    static_assert(std::atomic<int>::is_always_lock_free);
+    known = static_cast<int>(status);
     struct sigaction action {};
-    action.sa_handler = [](int) { _exit(static_cast<int>(ExitStatus::kDone)); };
+    action.sa_handler = [](int) { _exit(known.load()); };
     sigaction(SIGALRM, &action, nullptr);
     const itimerval once{{0, 0}, {0, kDeadlineUs}};
     setitimer(ITIMER_REAL, &once, nullptr);
 }
 
-}  // namespace
-
-void block_signals() {
+void block(std::initializer_list<int> signals) {
     sigset_t set;
     sigemptyset(&set);
-    for (const int each : {SIGTERM, SIGINT, SIGHUP, SIGXCPU})
+    for (const int each : signals)
         sigaddset(&set, each);
     pthread_sigmask(SIG_BLOCK, &set, nullptr);
+}
+
+std::atomic<bool> supervised{false};
+pthread_t supervising;  // the main thread, once it blocks the signals it waits for
+
+void on_end_signal(int number) {
+    if (!supervised.load()) _exit(static_cast<int>(ExitStatus::kDone));
+    // A library's thread from before they were blocked got it.
+    pthread_kill(supervising, number);
+}
+
+// This thread and those it starts leave the end of the program to the supervisor from now on.
+void begin_supervision() {
+    block({SIGTERM, SIGINT});
+    supervising = pthread_self();
+    supervised = true;
+}
+
+}  // namespace
+
+void prepare_signals() {
+    block({SIGHUP, SIGXCPU});
+    struct sigaction action {};
+    action.sa_handler = on_end_signal;
+    action.sa_flags = SA_RESTART;
+    for (const int each : {SIGTERM, SIGINT})
+        sigaction(each, &action, nullptr);
     signal(SIGPIPE, SIG_IGN);
 }
 
@@ -196,21 +233,39 @@ ExitStatus run_daemon(const DaemonOptions& options) {
         fmt::print("{}: the configuration is good\n", options.config.string());
         return ExitStatus::kDone;
     }
+    begin_supervision();
     parts->introduce();
 
     std::atomic<bool> stop{false};
-    std::string failure;  // of the pipeline's start; written before pipeline_ended
+    std::string failure;  // of the pipeline's start; written before pipeline_ended, like the report
     std::atomic<bool> pipeline_ended{false};
     std::atomic<bool> health_ended{false};
     Supervisor supervisor({parts->running, parts->counters, parts->tracker, parts->health, manager,
                            parts->real_time, parts->driver.cameras, pipeline_ended,
                            [&] { parts->reload(options); }});
-    std::jthread health([&] {
+    std::jthread health;
+    std::jthread pipeline;
+    // Whatever leaves this function, no thread may be waited for that was not told to end.
+    struct EndThreads {
+        std::atomic<bool>& stop;
+        Supervisor& supervisor;
+        bool told = false;
+        void operator()() {
+            if (std::exchange(told, true)) return;
+            stop = true;
+            supervisor.end_health();
+        }
+        ~EndThreads() {
+            if (!told) arm_deadline(ExitStatus::kFailed);
+            (*this)();
+        }
+    } end_threads{stop, supervisor};
+    health = std::jthread([&] {
         pthread_setname_np(pthread_self(), "gl-health");
         supervisor.send_health();
         health_ended = true;
     });
-    std::jthread pipeline([&] {
+    pipeline = std::jthread([&] {
         try {
             parts->run(stop);
         } catch (const std::exception& fault) {
@@ -225,22 +280,20 @@ ExitStatus run_daemon(const DaemonOptions& options) {
         return true;
     });
 
+    const auto status_so_far = [&] {
+        if (!pipeline_ended) return ExitStatus::kDone;
+        if (!failure.empty()) return ExitStatus::kFailed;
+        return told_to_stop || parts->report.source_error.empty() ? ExitStatus::kDone : ExitStatus::kInput;
+    };
     manager.tell("STOPPING=1\nSTATUS=stopping");
-    arm_deadline();
-    stop = true;
-    supervisor.end_health();
+    arm_deadline(status_so_far());
+    end_threads();
     const bool ended = wait_for(pipeline_ended) && wait_for(health_ended);
     if (!ended)
         log().warn("a camera or the network does not let go: the program ends without waiting for it");
-    ExitStatus status = ExitStatus::kDone;
-    if (!told_to_stop && !parts->report.source_error.empty()) {
-        log().error("{}", parts->report.source_error);
-        status = ExitStatus::kInput;
-    }
-    if (ended && !failure.empty()) {
-        log().error("{}", failure);
-        status = ExitStatus::kFailed;
-    }
+    const ExitStatus status = status_so_far();
+    if (status == ExitStatus::kInput) log().error("{}", parts->report.source_error);
+    if (status == ExitStatus::kFailed) log().error("{}", failure);
     log().info("ended");
     close_log();
     // Threads that hang can neither be joined nor outlive what they use.

@@ -19,8 +19,9 @@ struct DaemonOptions {
     bool check_only = false;
 };
 
-// Blocks the signals that the daemon waits for in this thread and all it starts: before anything else.
-void block_signals();
+// Before anything else and from the main thread. Until the pipeline is set up SIGTERM and SIGINT end the
+// program at once with status 0, also where a file or a device does not answer; SIGHUP waits.
+void prepare_signals();
 
 // Returns when a recording ended, a thread failed, or SIGTERM or SIGINT came; after such a signal the program
 // ends within a second whatever hangs, if need be from inside here with status 0. Throws Refusal for what can

@@ -62,6 +62,11 @@ spdlog::logger& log() {
     return *logger;
 }
 
+std::size_t lost_lines() {
+    const auto pool = spdlog::thread_pool();
+    return pool ? pool->overrun_counter() : 0;
+}
+
 void close_log() {
     spdlog::shutdown();
 }

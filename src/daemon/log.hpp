@@ -3,6 +3,7 @@
 
 #include <spdlog/logger.h>
 
+#include <cstddef>
 #include <string>
 
 namespace groundline::daemon {
@@ -13,6 +14,8 @@ bool stderr_is_journal();
 // The log of this program. A thread of its own writes, so that a journal that hangs costs the oldest lines
 // and never time. The first call starts that thread; not for the threads that handle frames.
 spdlog::logger& log();
+// How many lines were lost so far because nobody took them.
+std::size_t lost_lines();
 // Writes what is left and ends that thread.
 void close_log();
 

@@ -50,7 +50,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-    groundline::daemon::block_signals();
+    groundline::daemon::prepare_signals();
     try {
         return run(argc, argv);
     } catch (const groundline::Refusal& refusal) {

@@ -66,7 +66,7 @@ void RealTime::adopt(pipeline::ThreadRole role) {
         priority.sched_priority = capture      ? settings_.capture_priority
                                   : processing ? settings_.process_priority
                                                : settings_.sinks_priority;
-        if (sched_setscheduler(0, SCHED_FIFO, &priority) == 0) {
+        if (sched_setscheduler(0, SCHED_FIFO | SCHED_RESET_ON_FORK, &priority) == 0) {
             ++scheduled_;
             const std::size_t index = threads_count_.fetch_add(1);
             if (index < kMostThreads) threads_[index].store(gettid());
@@ -90,9 +90,11 @@ void RealTime::lock_memory() {
 
 void RealTime::give_up() {
     const sched_param ordinary{};
+    // Only root may take the flag away again.
+    constexpr int kOrdinary = SCHED_OTHER | SCHED_RESET_ON_FORK;
     const std::size_t count = std::min(threads_count_.load(), kMostThreads);
     for (std::size_t index = 0; index < count; ++index)
-        if (const pid_t thread = threads_[index].load()) sched_setscheduler(thread, SCHED_OTHER, &ordinary);
+        if (const pid_t thread = threads_[index].load()) sched_setscheduler(thread, kOrdinary, &ordinary);
     ++refused_;
 }
 

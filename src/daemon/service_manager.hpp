@@ -17,7 +17,8 @@ class ServiceManager {
     ServiceManager(const ServiceManager&) = delete;
     ServiceManager& operator=(const ServiceManager&) = delete;
 
-    // Lines of NAME=VALUE. Never waits: what the manager cannot take now is lost, false.
+    // Lines of NAME=VALUE. Never waits: what the manager cannot take now is lost, false: tell it again. True
+    // also where there is nobody to tell.
     bool tell(const std::string& lines) const;
 
     // Within which WATCHDOG=1 is expected, 0 where it is not.

@@ -19,12 +19,25 @@ std::string verdict_of(const publish::HealthReport& report) {
     return why.empty() ? text : fmt::format("{} ({})", text, why);
 }
 
+namespace {
+
+// Why no pair comes.
+const char* lack_of(const publish::HealthReport& report) {
+    const publish::CameraHealth& camera = report.camera;
+    if (camera.state && *camera.state != verdict::CameraState::kRunning) return "waiting for cameras";
+    if (camera.out_of_step) return "the cameras are out of step";
+    if (report.counts[static_cast<std::size_t>(Count::kFramesBad)] > 0) return "the pictures cannot be read";
+    return "waiting for pairs";
+}
+
+}  // namespace
+
 std::string status_of(const publish::HealthReport& report) {
     switch (report.state) {
         case publish::LifeState::kStarting:
-            return "waiting for cameras";
+            return lack_of(report);
         case publish::LifeState::kStalled:
-            return fmt::format("no pairs for {:.0f} s, waiting for cameras", report.result_age_s);
+            return fmt::format("no pairs for {:.0f} s, {}", report.result_age_s, lack_of(report));
         case publish::LifeState::kStopping:
             return "stopping";
         case publish::LifeState::kRunning:

@@ -7,8 +7,8 @@
 
 namespace groundline::daemon {
 
-// "waiting for cameras", "running: 29.8 pairs/s, degraded (overload)", "no pairs for 3 s, waiting for
-// cameras", "stopping".
+// "waiting for cameras", "running: 29.8 pairs/s, degraded (overload)", "no pairs for 3 s, the cameras are out
+// of step", "stopping".
 std::string status_of(const publish::HealthReport& report);
 
 // The verdict with what makes it less than trusted: "trusted", "degraded (dark, uneven)".

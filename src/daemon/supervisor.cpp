@@ -8,6 +8,7 @@
 
 #include <csignal>
 #include <system_error>
+#include <utility>
 
 #include "core/clock.hpp"
 #include "daemon/log.hpp"
@@ -63,9 +64,11 @@ bool Supervisor::run(const std::function<bool()>& ready) {
         while (read(signals.get(), &signal, sizeof signal) == static_cast<ssize_t>(sizeof signal)) {
             if (signal.ssi_signo == SIGTERM || signal.ssi_signo == SIGINT) return true;
             if (signal.ssi_signo == SIGHUP) {
-                watched_.manager.tell(fmt::format("RELOADING=1\nMONOTONIC_USEC={}", now_mono_ns() / 1000));
+                if (ready_)
+                    watched_.manager.tell(
+                        fmt::format("RELOADING=1\nMONOTONIC_USEC={}", now_mono_ns() / 1000));
                 watched_.reload();
-                watched_.manager.tell("READY=1");
+                if (ready_) ready_ = watched_.manager.tell("READY=1");
             } else {
                 watched_.real_time.give_up();
                 log().warn(
@@ -76,11 +79,10 @@ bool Supervisor::run(const std::function<bool()>& ready) {
         std::uint64_t ticks = 0;
         if (read(timer.get(), &ticks, sizeof ticks) != static_cast<ssize_t>(sizeof ticks)) continue;
         if (!ready_ && ready()) {
-            ready_ = true;
             for (const std::string& warning : watched_.real_time.warnings())
                 log().warn("{}", warning);
-            watched_.manager.tell("READY=1");
-            log().info("ready");
+            if (!std::exchange(said_ready_, true)) log().info("ready");
+            ready_ = watched_.manager.tell("READY=1");
         }
         tick(now_mono_ns());
     }
@@ -96,8 +98,7 @@ void Supervisor::tick(std::int64_t now_mono_ns) {
     host_.memory_locked = watched_.real_time.memory_locked() ? 1 : 0;
     look_at_cameras();
     watched_.tracker.add(host_);
-    publish::HealthReport report = watched_.tracker.report(now_utime_us(), now_mono_ns);
-    if (cameras_.out_of_step) report.reasons.add(Reason::kUnsynchronised);
+    const publish::HealthReport report = watched_.tracker.report(now_utime_us(), now_mono_ns);
     hand_over_health(report);
     watch(now_mono_ns);
     log_changes(report, now_mono_ns);
@@ -110,6 +111,8 @@ void Supervisor::look_at_cameras() {
     host_.exposure_difference_ms = cameras_.exposure_difference_ms;
     publish::CameraHealth health;
     health.state = cameras_.state;
+    health.out_of_step = cameras_.out_of_step;
+    health.skew_ms = cameras_.skew_ms;
     health.drift_ppm = cameras_.drift_ppm;
     health.left_mean = cameras_.mean[0];
     health.right_mean = cameras_.mean[1];
@@ -138,6 +141,7 @@ void Supervisor::watch(std::int64_t now_mono_ns) {
     progress.results_lost = counters.get(Count::kResultsOverwritten);
     progress.delivered = counters.get(Count::kResultsDelivered);
     progress.health_beats = health_beats_.load();
+    progress.in_device_call = watched_.cameras != nullptr && watched_.cameras->in_device_call();
     const verdict::Liveness look =
         verdict::judge_liveness(progress, liveness_, now_mono_ns, limit_ns > 0 ? limit_ns / 2 : kStillNs);
     liveness_ = look.state;
@@ -154,12 +158,10 @@ void Supervisor::watch(std::int64_t now_mono_ns) {
     if (look.stuck == verdict::Stuck::kNone) {
         // The tick before half the time is up, so that none comes after it.
         if (fed_mono_ns_ != 0 && now_mono_ns - fed_mono_ns_ < limit_ns / 2 - kTickNs) return;
-        fed_mono_ns_ = now_mono_ns;
-        watched_.manager.tell("WATCHDOG=1");
+        if (watched_.manager.tell("WATCHDOG=1")) fed_mono_ns_ = now_mono_ns;
     } else if (!triggered_ && look.still_ns >= limit_ns - 2 * kTickNs) {
         // Else the manager would count from the last feeding, up to half a limit later.
-        triggered_ = true;
-        watched_.manager.tell("WATCHDOG=trigger");
+        triggered_ = watched_.manager.tell("WATCHDOG=trigger");
     }
 }
 
@@ -187,17 +189,25 @@ void Supervisor::log_changes(const publish::HealthReport& report, std::int64_t n
         logged_bad_ = bad;
         bad_mono_ns_ = now_mono_ns;
     }
+    const std::size_t lost = lost_lines();
+    if (lost != logged_lost_ && now_mono_ns - lost_mono_ns_ >= kSecondNs) {
+        logged_lost_ = lost;
+        lost_mono_ns_ = now_mono_ns;
+        log().warn("{} lines of this log so far were lost, because nobody took them in time", lost);
+    }
 }
 
 void Supervisor::tell_status(const publish::HealthReport& report, std::int64_t now_mono_ns) {
     if (status_mono_ns_ != 0 && now_mono_ns - status_mono_ns_ < kSecondNs) return;
     std::string status = status_of(report);
     // Why there are none, as long as there are none.
-    if (watched_.cameras != nullptr && cameras_.state != verdict::CameraState::kRunning &&
-        !cameras_.last_fault.empty() && report.state != publish::LifeState::kStopping)
+    const bool none =
+        report.state == publish::LifeState::kStarting || report.state == publish::LifeState::kStalled;
+    if (watched_.cameras != nullptr && !cameras_.last_fault.empty() && !cameras_.out_of_step &&
+        (none || cameras_.state != verdict::CameraState::kRunning))
         status += fmt::format(": {}", cameras_.last_fault.view());
     if (status == status_) return;
-    watched_.manager.tell("STATUS=" + status);
+    if (!watched_.manager.tell("STATUS=" + status)) return;
     status_ = std::move(status);
     status_mono_ns_ = now_mono_ns;
 }

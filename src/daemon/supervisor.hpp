@@ -40,7 +40,8 @@ class Supervisor {
     explicit Supervisor(const Watched& watched);
 
     // Until the pipeline ends by itself or SIGTERM or SIGINT comes: true after such a signal. `ready` is
-    // asked until it says that all threads run; then the service manager is told.
+    // asked until it says that all threads run; then the service manager is told. What the manager cannot
+    // take is told again.
     bool run(const std::function<bool()>& ready);
     // On a thread of its own: sends health until end_health().
     void send_health();
@@ -60,7 +61,8 @@ class Supervisor {
     pipeline::TripleBuffer<publish::HealthReport> reports_{{}};
     std::atomic<std::uint64_t> health_beats_{0};
 
-    bool ready_ = false;
+    bool ready_ = false;  // and the manager knows
+    bool said_ready_ = false;
     publish::HostHealth host_;
     capture::CameraStatus cameras_;
     std::int64_t host_mono_ns_ = 0;
@@ -76,6 +78,8 @@ class Supervisor {
     std::int64_t state_mono_ns_ = 0;
     std::uint64_t logged_bad_ = 0;
     std::int64_t bad_mono_ns_ = 0;
+    std::size_t logged_lost_ = 0;
+    std::int64_t lost_mono_ns_ = 0;
 };
 
 }  // namespace groundline::daemon

@@ -43,6 +43,14 @@ void stamp_as_taken(std::int64_t mono_ns, FrameStamp& stamp) {
     stamp.source = StampSource::kArrival;
 }
 
+// Long enough that the thread really leaves its processor: a shorter sleep may be over before that.
+constexpr long kRestNs = 50'000;
+
+void rest() {
+    const timespec span{0, kRestNs};
+    clock_nanosleep(CLOCK_MONOTONIC, 0, &span, nullptr);
+}
+
 void name_this_thread(const char* name) {
     pthread_setname_np(pthread_self(), name);
 }
@@ -78,12 +86,12 @@ void Pipeline::run(const RunOptions& options, const std::atomic<bool>& stop, Bad
     sinks = std::jthread([&] {
         name_this_thread("gl-sinks");
         if (options.on_thread) options.on_thread(ThreadRole::kSinks);
-        deliver(report);
+        deliver(options, report);
     });
     processing = std::jthread([&] {
         name_this_thread("gl-process");
         if (options.on_thread) options.on_thread(ThreadRole::kProcessing);
-        process(report);
+        process(options, report);
     });
     name_this_thread("gl-capture");
     if (options.on_thread) options.on_thread(ThreadRole::kCapture);
@@ -101,7 +109,8 @@ void Pipeline::tune(const Tuning& tuning) {
 
 void Pipeline::capture(const RunOptions& options, const std::atomic<bool>& stop, BadPair on_bad,
                        RunReport& report) {
-    Pacer pacer(options.pace == Pace::kFixed ? static_cast<std::int64_t>(1e9 / options.rate_hz) : 0);
+    Pacer pacer(options.pace == Pace::kFixed ? static_cast<std::int64_t>(1e9 / options.rate_hz) : 0,
+                options.stamp_when_due ? Pacer::Late::kLeaveOut : Pacer::Late::kCatchUp);
     std::int64_t taken = 0;
     while (options.frames < 0 || taken < options.frames) {
         if (stop.load(std::memory_order_relaxed)) {
@@ -125,6 +134,8 @@ void Pipeline::capture(const RunOptions& options, const std::atomic<bool>& stop,
         if (pull == Pull::kBad) {
             counters_.add(Count::kFramesBad);
             on_bad(slot->frame.stamp, source_.error());
+            // It takes its time like a good one: pairs that are all gone would come without end, at once.
+            if (options.pace != Pace::kMax) sleep_until(pacer.due_without_stamp_ns(now_mono_ns()), stop);
             continue;
         }
         if (options.pace != Pace::kMax) {
@@ -135,10 +146,11 @@ void Pipeline::capture(const RunOptions& options, const std::atomic<bool>& stop,
         slot->arrival_mono_ns = now_mono_ns();
         counters_.add(Count::kFramesRead);
         if (captured_->commit()) counters_.add(Count::kFramesOverwritten);
+        if (options.rest) rest();
     }
 }
 
-void Pipeline::process(RunReport& report) {
+void Pipeline::process(const RunOptions& options, RunReport& report) {
     const verdict::OverloadLimits limits;
     verdict::OverloadState overload;
     std::uint64_t lost_before = 0;
@@ -160,11 +172,12 @@ void Pipeline::process(RunReport& report) {
         counters_.add(Count::kFramesProcessed);
         captured_->release();
         if (finished_->commit()) counters_.add(Count::kResultsOverwritten);
+        if (options.rest) rest();
     }
     finished_->end_of_stream();
 }
 
-void Pipeline::deliver(RunReport& report) {
+void Pipeline::deliver(const RunOptions& options, RunReport& report) {
     while (ResultSlot* finished = finished_->take()) {
         for (const SinkSlot& slot : sinks_) {
             const std::int64_t begin_ns = now_mono_ns();
@@ -185,6 +198,7 @@ void Pipeline::deliver(RunReport& report) {
         report.latency.add(now_mono_ns() - finished->arrival_mono_ns);
         counters_.add(Count::kResultsDelivered);
         finished_->release();
+        if (options.rest) rest();
     }
 }
 

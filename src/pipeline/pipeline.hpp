@@ -38,6 +38,10 @@ struct RunOptions {
     // As if cameras took the pairs now: each is stamped with the instant it was due, on the clocks of this
     // computer. For paced runs.
     bool stamp_when_due = false;
+    // Each thread sleeps an instant after every frame. The kernel counts how long a real-time thread runs
+    // without ever waiting and takes that for a thread gone wild (RLIMIT_RTTIME); under overload a frame
+    // always waits already, so that without this a thread that is merely busy would be counted so too.
+    bool rest = false;
     // Called once on each thread before its first frame; empty: nothing.
     std::function<void(ThreadRole)> on_thread = {};
 };
@@ -90,8 +94,8 @@ class Pipeline {
     };
 
     void capture(const RunOptions& options, const std::atomic<bool>& stop, BadPair on_bad, RunReport& report);
-    void process(RunReport& report);
-    void deliver(RunReport& report);
+    void process(const RunOptions& options, RunReport& report);
+    void deliver(const RunOptions& options, RunReport& report);
 
     FrameSource& source_;
     Processor& processor_;

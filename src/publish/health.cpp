@@ -28,9 +28,11 @@ HealthTracker::HealthTracker(const Counters* counters, std::int64_t stale_after_
     : counters_(counters), stale_after_ns_(stale_after_ns) {}
 
 void HealthTracker::note(const FrameResult& result, std::int64_t publish_ns, std::int64_t now_mono_ns) {
+    // The result's own time for publishing, if any, is that of the frame before in the same slot.
+    constexpr auto kPublish = static_cast<std::size_t>(Stage::kPublish);
     for (std::size_t stage = 0; stage < stages_.size(); ++stage)
-        if (result.times_ns[stage] > 0) stages_[stage].add(result.times_ns[stage]);
-    stages_[static_cast<std::size_t>(Stage::kPublish)].add(publish_ns);
+        if (stage != kPublish && result.times_ns[stage] > 0) stages_[stage].add(result.times_ns[stage]);
+    stages_[kPublish].add(publish_ns);
     if (is_of_this_clock(result.stamp.source))
         exposure_to_publish_.add(now_mono_ns - result.stamp.exposure_mono_ns);
 
@@ -105,6 +107,11 @@ HealthReport HealthTracker::report(std::int64_t now_utime_us, std::int64_t now_m
         report.verdict = Verdict::kBlind;
         report.reasons = Reasons();
         report.reasons.add(Reason::kNoFrames);
+    }
+    if (camera_.out_of_step) {
+        report.reasons.add(Reason::kUnsynchronised);
+        report.pair_skew_ms = camera_.skew_ms;
+        if (report.verdict == Verdict::kTrusted) report.verdict = Verdict::kDegraded;
     }
     for (std::size_t stage = 0; stage < stages_.size(); ++stage)
         report.stages[stage] = summary_of(stages_[stage]);

@@ -54,6 +54,8 @@ struct CameraHealth {
     double left_saturated = kNotMeasured;
     double right_saturated = kNotMeasured;
     std::array<char, 256> fault{};  // ends with a 0
+    bool out_of_step = false;       // both eyes deliver, but nothing pairs
+    double skew_ms = kNotMeasured;  // how far apart they are then
 };
 
 // Fields as in lcmtypes/health_t.lcm.
@@ -89,7 +91,8 @@ class HealthTracker {
     // `counters`, which may be null, is borrowed.
     HealthTracker(const Counters* counters, std::int64_t stale_after_ns);
 
-    // A result was published; it took `publish_ns`. Stages with time 0 were not timed.
+    // A result was published; it took `publish_ns`, whatever the result says of that stage. Stages with time
+    // 0 were not timed.
     void note(const FrameResult& result, std::int64_t publish_ns, std::int64_t now_mono_ns);
 
     // All else is for the thread that asks for reports.
@@ -99,7 +102,8 @@ class HealthTracker {
 
     // No result yet, or none for longer than stale_after_ns.
     bool silent(std::int64_t now_mono_ns);
-    // Rates are over the last full second between two reports; not measured before.
+    // Rates are over the last full second between two reports; not measured before. While the cameras are out
+    // of step the skew is theirs and the newest verdict is degraded at best.
     HealthReport report(std::int64_t now_utime_us, std::int64_t now_mono_ns);
 
   private:

@@ -256,16 +256,18 @@ void add_capture_keys(std::vector<Key>& keys) {
                "Cameras: the right one takes over exposure and gain that the left one says it uses; not "
                "for cameras whose automatic does not say.",
                GROUNDLINE_MEMBER(capture.follow_exposure)));
-    keys.push_back(
-        number("capture.pair_tolerance_ms", 0.01, 1000.0,
-               "Cameras: exposures further apart are no pair; beyond 2 ms the verdict is degraded.",
-               GROUNDLINE_MEMBER(capture.pair_tolerance_ms)));
+    keys.push_back(number(
+        "capture.pair_tolerance_ms", 0.01, 1000.0,
+        "Cameras: exposures further apart, or by more than half a period, are no pair; beyond 2 ms the "
+        "verdict is degraded.",
+        GROUNDLINE_MEMBER(capture.pair_tolerance_ms)));
     keys.push_back(number("capture.start_timeout_s", 0.5, 600.0,
                           "Cameras: opened again when no picture has come for this long after a start.",
                           GROUNDLINE_MEMBER(capture.start_timeout_s)));
-    keys.push_back(number("capture.stall_timeout_s", 0.1, 60.0,
-                          "Cameras: opened again when an eye gave no picture for this long.",
-                          GROUNDLINE_MEMBER(capture.stall_timeout_s)));
+    keys.push_back(
+        number("capture.stall_timeout_s", 0.1, 60.0,
+               "Cameras: opened again when an eye gave no picture for this long; 3 periods or more.",
+               GROUNDLINE_MEMBER(capture.stall_timeout_s)));
 }
 
 void add_daemon_keys(std::vector<Key>& keys) {

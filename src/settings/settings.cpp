@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <sstream>
 
@@ -135,7 +137,14 @@ capture::CameraSourceConfig camera_source_config(const Settings& settings) {
     config.height = camera.height;
     config.rate_hz = camera.rate_hz;
     config.side_by_side = camera.side_by_side();
-    config.pairing.tolerance_ns = static_cast<std::int64_t>(live.pair_tolerance_ms * 1e6);
+    const double period_s = 1.0 / camera.rate_hz;
+    if (live.stall_timeout_s < 3.0 * period_s)
+        refuse(
+            fmt::format("capture.stall_timeout_s {} is less than three pictures take at capture.rate_hz {}: "
+                        "set it to {:.3g} or more",
+                        live.stall_timeout_s, camera.rate_hz, std::ceil(300.0 * period_s) / 100.0));
+    config.pairing.tolerance_ns =
+        static_cast<std::int64_t>(std::min(live.pair_tolerance_ms * 1e6, period_s * 1e9 / 2.0));
     config.limits.start_ns = static_cast<std::int64_t>(live.start_timeout_s * 1e9);
     config.limits.stall_ns = static_cast<std::int64_t>(live.stall_timeout_s * 1e9);
     config.follow_exposure = live.follow_exposure;

@@ -99,7 +99,8 @@ verdict::Limits verdict_limits(const Settings& settings);
 
 // What a live source gets (capture/camera_source.hpp); its driver gets settings.capture.camera. Throws
 // Refusal(kConfig) where the cameras are not named: either one device for both eyes, or a left and a right
-// one.
+// one; and for a capture.stall_timeout_s below three periods. The tolerance is at most half a period: beyond
+// that a picture would belong to two pairs.
 capture::CameraSourceConfig camera_source_config(const Settings& settings);
 
 // What of `wanted` a running daemon can take over, and what it cannot.

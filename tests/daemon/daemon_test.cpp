@@ -1,7 +1,10 @@
 // The daemon as a service manager and a controller see it: start, health, reload, watchdog, end, refusals.
 #include <gtest/gtest.h>
 
+#include <fcntl.h>
 #include <sched.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -147,6 +150,33 @@ TEST_F(Daemon, ABadConfigurationIsRefusedWholeAndTheOldOneStays) {
     EXPECT_EQ(status, 0);
 }
 
+TEST_F(Daemon, AConfigurationThatCannotBeLookedAtStopsNothing) {
+    Service service(start());
+    ASSERT_TRUE(ready(service)) << service.said();
+    std::filesystem::remove(config_);
+    std::filesystem::create_symlink(config_.filename(), config_);  // to itself
+    service.signal(SIGHUP);
+    ASSERT_TRUE(eventually([&] { return service.says("stays in force"); })) << service.said();
+    EXPECT_TRUE(eventually([&] { return service.told("READY=1") == 2; }));
+    int status = -1;
+    service.end_ms(SIGTERM, status);
+    EXPECT_EQ(status, 0) << service.said();
+}
+
+// A file on a mount that hangs looks like a pipe that nobody writes to.
+TEST_F(Daemon, EndsWhileItIsBeingSetUp) {
+    const std::string hung = folder_.at("body.png");
+    ASSERT_EQ(mkfifo(hung.c_str(), 0600), 0);
+    Service service(start({"--set", "mount.body_mask=" + hung}));
+    int writer = -1;
+    ASSERT_TRUE(eventually([&] { return (writer = open(hung.c_str(), O_WRONLY | O_NONBLOCK)) >= 0; }))
+        << "nobody reads the picture: " << service.said();
+    service.signal(SIGTERM);
+    EXPECT_EQ(service.wait(), 0) << service.said();
+    close(writer);
+    EXPECT_EQ(service.told("READY=1"), 0);
+}
+
 TEST_F(Daemon, WatchdogIsFedWhileEverythingMoves) {
     Start with = start();
     with.watchdog_us = 2'000'000;
@@ -210,7 +240,7 @@ TEST_F(Daemon, WithoutPairsItSaysBlindAndShowsNoMask) {
     EXPECT_EQ(sectors.verdict, mask_t::VERDICT_BLIND);
     EXPECT_EQ(sectors.reasons, mask_t::REASON_NO_FRAMES);
     EXPECT_EQ(sectors.count, 0);
-    EXPECT_TRUE(eventually([&] { return service.told("waiting for cameras") > 0; }));
+    EXPECT_TRUE(eventually([&] { return service.told("waiting for pairs") > 0; }));
 }
 
 // Whatever thread hangs; the pipeline then cannot be waited for.
@@ -336,6 +366,25 @@ std::pair<int, int> schedule_of(const Service& service, const std::string& threa
     return {-1, -1};
 }
 
+// SCHED_FIFO, and ordinary for what the thread starts.
+constexpr int kRealTime = SCHED_FIFO | SCHED_RESET_ON_FORK;
+constexpr int kOrdinaryAgain = SCHED_OTHER | SCHED_RESET_ON_FORK;
+
+// Processor time of that thread so far, in seconds.
+double busy_s(const Service& service, const std::string& thread) {
+    const std::filesystem::path tasks = "/proc/" + std::to_string(service.pid()) + "/task";
+    for (const auto& task : std::filesystem::directory_iterator(tasks)) {
+        std::ifstream comm(task.path() / "comm");
+        std::string name;
+        if (!std::getline(comm, name) || name != thread) continue;
+        std::ifstream schedstat(task.path() / "schedstat");
+        double ns = 0.0;
+        schedstat >> ns;
+        return ns / 1e9;
+    }
+    return 0.0;
+}
+
 bool may_be_real_time() {
     const sched_param before{};
     sched_param wanted{};
@@ -359,10 +408,10 @@ TEST_F(Daemon, RunsInRealTimeWhereThatIsPermitted) {
                            "realtime.capture_priority=31", "--set", "realtime.sinks_cpus=0"}));
     ASSERT_TRUE(receiver.until([&] { return receiver.on("GROUNDLINE_HEALTH").size() >= 10; }))
         << service.said();
-    EXPECT_EQ(schedule_of(service, "gl-capture"), std::make_pair(SCHED_FIFO, 31));
-    EXPECT_EQ(schedule_of(service, "gl-process"), std::make_pair(SCHED_FIFO, 20));
-    EXPECT_EQ(schedule_of(service, "gl-worker1"), std::make_pair(SCHED_FIFO, 20));
-    EXPECT_EQ(schedule_of(service, "gl-sinks"), std::make_pair(SCHED_FIFO, 10));
+    EXPECT_EQ(schedule_of(service, "gl-capture"), std::make_pair(kRealTime, 31));
+    EXPECT_EQ(schedule_of(service, "gl-process"), std::make_pair(kRealTime, 20));
+    EXPECT_EQ(schedule_of(service, "gl-worker1"), std::make_pair(kRealTime, 20));
+    EXPECT_EQ(schedule_of(service, "gl-sinks"), std::make_pair(kRealTime, 10));
     EXPECT_EQ(schedule_of(service, "groundlined").first, SCHED_OTHER);
     EXPECT_EQ(schedule_of(service, "gl-health").first, SCHED_OTHER);
     const auto health = receiver.last<health_t>("GROUNDLINE_HEALTH");
@@ -371,10 +420,36 @@ TEST_F(Daemon, RunsInRealTimeWhereThatIsPermitted) {
     EXPECT_FALSE(service.says("refused")) << service.said();
     // A thread that never pauses: the kernel says so, and all of them are made ordinary.
     service.signal(SIGXCPU);
-    ASSERT_TRUE(eventually([&] { return schedule_of(service, "gl-worker1").first == SCHED_OTHER; }));
-    EXPECT_EQ(schedule_of(service, "gl-capture").first, SCHED_OTHER);
+    ASSERT_TRUE(eventually([&] { return schedule_of(service, "gl-worker1").first == kOrdinaryAgain; }));
+    EXPECT_EQ(schedule_of(service, "gl-capture").first, kOrdinaryAgain);
     EXPECT_TRUE(receiver.until(
         [&] { return receiver.last<health_t>("GROUNDLINE_HEALTH").realtime_scheduling == 0; }));
+}
+
+// Processing that is always late waits for nothing, and is still no thread gone wild.
+TEST_F(Daemon, OverloadDoesNotCostRealTime) {
+    if (!may_be_real_time()) GTEST_SKIP() << "real-time scheduling is not permitted here";
+    const Folder folder;
+    ASSERT_EQ(
+        run_groundline({"synth", "boxes?width=640&height=480&frames=2", "--out", folder.at("pairs")}).status,
+        0);
+    for (const char* eye : {"left", "right"}) {  // a name of 19 digits is a time in ns: 2 ms apart
+        const std::filesystem::path pictures = folder / "pairs" / eye;
+        std::vector<std::filesystem::path> found;
+        for (const auto& entry : std::filesystem::directory_iterator(pictures))
+            found.push_back(entry.path());
+        ASSERT_EQ(found.size(), 2U);
+        std::sort(found.begin(), found.end());
+        std::filesystem::rename(found[0], pictures / "1700000000000000000.png");
+        std::filesystem::rename(found[1], pictures / "1700000000002000000.png");
+    }
+    Service service(start({"--set", "capture.driver=files", "--set", "capture.source=" + folder.at("pairs"),
+                           "--set", "stereo.disparities=64", "--set", "realtime.scheduling=on"}));
+    ASSERT_TRUE(ready(service)) << service.said();
+    ASSERT_TRUE(eventually([&] { return busy_s(service, "gl-process") > 5.0; }))
+        << busy_s(service, "gl-process");
+    EXPECT_FALSE(service.says("given up")) << service.said();
+    EXPECT_EQ(schedule_of(service, "gl-process"), std::make_pair(kRealTime, 20));
 }
 
 TEST_F(Daemon, WhatIsNotPermittedIsSaidOnceAndInHealth) {

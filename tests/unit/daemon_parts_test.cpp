@@ -12,6 +12,7 @@
 #include <fstream>
 
 #include "daemon/host_health.hpp"
+#include "daemon/log.hpp"
 #include "daemon/service_manager.hpp"
 #include "daemon/status.hpp"
 
@@ -35,9 +36,19 @@ HealthReport report(LifeState state, Verdict verdict, std::initializer_list<Reas
 
 TEST(Status, IsOneSentence) {
     EXPECT_EQ(status_of(report(LifeState::kStarting, Verdict::kBlind, {Reason::kNoFrames})),
-              "waiting for cameras");
-    EXPECT_EQ(status_of(report(LifeState::kStalled, Verdict::kBlind, {Reason::kNoFrames})),
-              "no pairs for 12 s, waiting for cameras");
+              "waiting for pairs");
+    HealthReport none = report(LifeState::kStalled, Verdict::kBlind, {Reason::kNoFrames});
+    EXPECT_EQ(status_of(none), "no pairs for 12 s, waiting for pairs");
+    none.camera.state = verdict::CameraState::kStarting;
+    EXPECT_EQ(status_of(none), "no pairs for 12 s, waiting for cameras");
+    none.camera.state = verdict::CameraState::kRunning;
+    EXPECT_EQ(status_of(none), "no pairs for 12 s, waiting for pairs");
+    none.counts[static_cast<std::size_t>(Count::kFramesBad)] = 3;
+    EXPECT_EQ(status_of(none), "no pairs for 12 s, the pictures cannot be read");
+    none.camera.out_of_step = true;
+    EXPECT_EQ(status_of(none), "no pairs for 12 s, the cameras are out of step");
+    none.camera.state = verdict::CameraState::kAbsent;
+    EXPECT_EQ(status_of(none), "no pairs for 12 s, waiting for cameras");
     EXPECT_EQ(status_of(report(LifeState::kStopping, Verdict::kBlind, {})), "stopping");
     EXPECT_EQ(status_of(report(LifeState::kRunning, Verdict::kTrusted, {Reason::kNoMountPrior})),
               "running: 29.8 pairs/s, trusted");
@@ -148,14 +159,50 @@ TEST(ServiceManager, IsToldAtAPathAndAtAnAbstractAddress) {
 }
 
 TEST(ServiceManager, IsNotThere) {
-    for (const char* address : {"", "relative", "@", "/nonexistent/notify"}) {
+    for (const std::string& address :
+         {std::string(), std::string("relative"), std::string("@"), std::string(200, '/')}) {
         set("NOTIFY_SOCKET", address);
-        EXPECT_FALSE(ServiceManager().tell("READY=1")) << address;
+        EXPECT_TRUE(ServiceManager().tell("READY=1")) << address;
     }
     unsetenv("NOTIFY_SOCKET");
-    EXPECT_FALSE(ServiceManager().tell("READY=1"));
-    set("NOTIFY_SOCKET", std::string(200, '/'));
-    EXPECT_FALSE(ServiceManager().tell("READY=1"));
+    EXPECT_TRUE(ServiceManager().tell("READY=1"));
+    set("NOTIFY_SOCKET", "/nonexistent/notify");
+    EXPECT_FALSE(ServiceManager().tell("READY=1")) << "it was there once, and may be back";
+}
+
+TEST(ServiceManager, SaysWhatItCouldNotTell) {
+    const std::string address = "@groundline-full-" + std::to_string(getpid());
+    const Manager manager(address);
+    set("NOTIFY_SOCKET", address);
+    const ServiceManager service;
+    int told = 0;
+    while (told < 100'000 && service.tell("WATCHDOG=1"))
+        ++told;
+    ASSERT_LT(told, 100'000) << "nobody reads, and yet there is room";
+    EXPECT_EQ(manager.next(), "WATCHDOG=1");
+    EXPECT_TRUE(service.tell("READY=1"));
+}
+
+// A reader of the log that stops costs lines, never time, and how many is known.
+TEST(Log, CountsTheLinesThatNobodyTook) {
+    std::array<int, 2> ends{};
+    ASSERT_EQ(pipe(ends.data()), 0);
+    const int before = dup(2);
+    dup2(ends[1], 2);
+    const std::size_t lost_before = lost_lines();
+    for (int i = 0; i < 2000; ++i)  // 200 KB: a pipe holds 64 KB
+        log().info("{}", std::string(100, 'x'));
+    const std::size_t lost = lost_lines() - lost_before;
+    dup2(before, 2);
+    close(before);
+    close(ends[1]);
+    std::array<char, 4096> taken{};
+    while (read(ends[0], taken.data(), taken.size()) > 0) {
+    }
+    close(ends[0]);
+    close_log();
+    EXPECT_GT(lost, 0U);
+    EXPECT_LT(lost, 2000U);
 }
 
 TEST(ServiceManager, AnotherProcessesWatchdogIsNotOurs) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/clock.hpp"
+#include "pipeline/pacer.hpp"
 #include "pipeline/pipeline.hpp"
 #include "pipeline/worker_pool.hpp"
 #include "support/allocation_count.hpp"
@@ -383,6 +384,29 @@ TEST(Pipeline, PacedPairsCanBeStampedAsIfTakenNow) {
     options.stamp_when_due = true;
     run_watched(source, parallel, sink, options, kNeverStop, counters);
     EXPECT_GT(last_ns, begin_ns);
+}
+
+TEST(Pacer, TimeThatWasLostIsCaughtUpWithOrLeftOut) {
+    constexpr std::int64_t kStep = 100;
+    for (const Pacer::Late late : {Pacer::Late::kCatchUp, Pacer::Late::kLeaveOut}) {
+        Pacer pacer(kStep, late);
+        EXPECT_EQ(pacer.due_ns(0, 1000), 1000);
+        EXPECT_EQ(pacer.due_ns(0, 1010), 1100);
+        EXPECT_EQ(pacer.due_ns(0, 1300), 1200) << "one step late is no loss";
+        const bool left_out = late == Pacer::Late::kLeaveOut;
+        EXPECT_EQ(pacer.due_ns(0, 5000), left_out ? 5000 : 1300);
+        EXPECT_EQ(pacer.due_ns(0, 5000), left_out ? 5100 : 1400);
+    }
+}
+
+TEST(Pacer, APairWithoutAStampTakesAStep) {
+    constexpr std::int64_t kMs = 1'000'000;
+    Pacer pacer(0);
+    EXPECT_EQ(pacer.due_ns(0, 0), 0);
+    EXPECT_EQ(pacer.due_ns(40 * kMs, 0), 40 * kMs);
+    EXPECT_EQ(pacer.due_without_stamp_ns(0), 80 * kMs);
+    EXPECT_EQ(pacer.due_without_stamp_ns(0), 120 * kMs);
+    EXPECT_EQ(pacer.due_ns(160 * kMs, 0), 160 * kMs) << "in time with the recording";
 }
 
 TEST(Pipeline, TuningTakesEffectWholeFromTheNextFrame) {

@@ -114,6 +114,36 @@ TEST(Health, LatenciesPerStage) {
     EXPECT_DOUBLE_EQ(report.exposure_to_publish.p99_ms, 50.0);
 }
 
+TEST(Health, PublishingIsTimedByWhoeverPublishes) {
+    Frame frame(8, 4);
+    frame.result.times_ns[static_cast<std::size_t>(Stage::kPublish)] = 90 * kMs;  // of the slot's last frame
+    HealthTracker tracker(nullptr, kStaleAfter);
+    tracker.note(frame.result, 6 * kMs, 1050 * kMs);
+    EXPECT_LT(tracker.report(0, 1100 * kMs).stages[static_cast<std::size_t>(Stage::kPublish)].max_ms, 10.0);
+}
+
+TEST(Health, CamerasOutOfStepCostTrustAndSayHowFar) {
+    Frame frame(8, 4);
+    frame.result.verdict = Verdict::kTrusted;
+    frame.result.reasons = {};
+    HealthTracker tracker(nullptr, kStaleAfter);
+    tracker.note(frame.result, kMs, 1000 * kMs);
+    CameraHealth camera;
+    camera.skew_ms = 17.5;
+    tracker.add(camera);
+    EXPECT_EQ(tracker.report(0, 1100 * kMs).verdict, Verdict::kTrusted);
+    camera.out_of_step = true;
+    tracker.add(camera);
+    HealthReport report = tracker.report(0, 1100 * kMs);
+    EXPECT_EQ(report.verdict, Verdict::kDegraded);
+    EXPECT_TRUE(report.reasons.has(Reason::kUnsynchronised));
+    EXPECT_EQ(report.pair_skew_ms, 17.5);
+    report = tracker.report(0, 2000 * kMs);
+    EXPECT_EQ(report.verdict, Verdict::kBlind) << "no pairs come";
+    EXPECT_TRUE(report.reasons.has(Reason::kNoFrames));
+    EXPECT_TRUE(report.reasons.has(Reason::kUnsynchronised));
+}
+
 TEST(Health, FilesHaveNoLatencyFromExposure) {
     Frame frame(8, 4);
     for (const StampSource source : {StampSource::kFile, StampSource::kUnknown}) {

@@ -142,6 +142,20 @@ TEST(Cameras, MustBeNamedOneWayOrTheOther) {
     }
 }
 
+TEST(Cameras, AreJudgedByTheirPeriod) {
+    Settings settings;
+    settings.capture.camera.left = "a";
+    settings.capture.camera.right = "b";
+    set_word(settings, "capture.rate_hz=4");
+    set_word(settings, "capture.pair_tolerance_ms=1000");
+    set_word(settings, "capture.stall_timeout_s=0.75");
+    EXPECT_EQ(camera_source_config(settings).pairing.tolerance_ns, 125'000'000) << "half a period at most";
+    set_word(settings, "capture.stall_timeout_s=0.74");
+    EXPECT_NE(
+        refusal([&] { (void)camera_source_config(settings); }, ExitStatus::kConfig).find("0.75 or more"),
+        std::string::npos);
+}
+
 TEST(Words, SetTheValueOrSayWhatWasExpected) {
     Settings settings;
     set_word(settings, "stereo.disparities=128");

@@ -110,6 +110,37 @@ TEST(Liveness, AWaitBeginsWithThePair) {
     }
 }
 
+// A bus that has to time out holds the capture thread up far longer than a thread may stand still elsewhere.
+TEST(Liveness, ADeviceMayTakeItsTime) {
+    Progress progress;
+    LivenessState state = judge_liveness(progress, {}, 0, kLimit).state;
+    progress.in_device_call = true;
+    std::int64_t now = 0;
+    const auto look = [&] {
+        now += kTick;
+        ++progress.health_beats;
+        const Liveness found = judge_liveness(progress, state, now, kLimit);
+        state = found.state;
+        return found.stuck;
+    };
+    for (int i = 0; i < 250; ++i)
+        ASSERT_EQ(look(), Stuck::kNone) << i;
+    progress.in_device_call = false;  // back, and the loop has not turned yet
+    for (int i = 0; i < kLimit / kTick; ++i)
+        ASSERT_EQ(look(), Stuck::kNone) << i;
+    EXPECT_EQ(look(), Stuck::kCapture);
+    progress.in_device_call = true;
+    for (int i = 0; i < kLongestDeviceCallNs / kTick; ++i)
+        ASSERT_EQ(look(), Stuck::kNone) << i;
+    EXPECT_EQ(look(), Stuck::kCapture);
+    // Only capture talks to devices.
+    progress = {.capture_turns = 1, .captured = 1, .in_device_call = true};
+    state = judge_liveness(progress, {}, now, kLimit).state;
+    for (int i = 1; i < kLimit / kTick; ++i)
+        ASSERT_EQ(look(), Stuck::kNone) << i;
+    EXPECT_EQ(look(), Stuck::kProcessing);
+}
+
 TEST(Liveness, ALateLookFindsWhatMovedInBetween) {
     Progress progress;
     LivenessState state = judge_liveness(progress, {}, 0, kLimit).state;
