@@ -24,9 +24,12 @@ constexpr std::int64_t kExposureLookNs = 1'000'000'000;
 constexpr std::int64_t kExposureFollowNs = 500'000'000;
 // Cameras at the edge of the tolerance go in and out of step by the second; the log need not.
 constexpr std::int64_t kStepQuietNs = 5'000'000'000;
+// A cable that goes bad loses pictures by the second as well: their sum is told.
+constexpr std::int64_t kLossesQuietNs = 60'000'000'000;
 // Mean and saturation are taken from every so many rows, which costs microseconds.
 constexpr int kMeasuredRows = 8;
 constexpr std::array<const char*, 2> kEyeNames = {"the left camera", "the right camera"};
+constexpr const char* kStereoName = "the stereo camera";
 
 class RealSourceClock final : public SourceClock {
   public:
@@ -146,8 +149,8 @@ void CameraSource::collect(std::int64_t deadline_ns) {
     }
     const std::int64_t left_out = driver_->left_out() - left_out_seen_;
     counters_.add(Count::kCameraLeftOut, static_cast<std::uint64_t>(left_out));
-    status_.left_out += left_out;
     left_out_seen_ += left_out;
+    look_at_losses();
     if (fault.ok())
         look_at_step();
     else
@@ -158,8 +161,8 @@ void CameraSource::admit(const CameraFrame& frame) {
     const bool both = frame.eye == Eye::kBoth;
     for (std::size_t eye = 0; eye < 2; ++eye) {
         if (!both && eye != static_cast<std::size_t>(frame.eye)) continue;
-        status_.gaps[eye] += frame.lost;
-        (frame.damaged ? status_.damaged : status_.pictures)[eye] += 1;
+        lost_[eye] += frame.lost;
+        damaged_[eye] += frame.damaged ? 1 : 0;
     }
     if (frame.lost > 0) counters_.add(Count::kCameraGaps, static_cast<std::uint64_t>(frame.lost));
     if (frame.damaged) {
@@ -179,7 +182,6 @@ void CameraSource::admit(const CameraFrame& frame) {
     if (both_) {
         driver_->release(*both_);
         counters_.add(Count::kCameraSuperseded);
-        ++status_.superseded;
     }
     both_ = frame;
 }
@@ -202,10 +204,8 @@ void CameraSource::drop(const Pairing::DroppedFrames& dropped, bool give_back) {
             ++superseded;
             continue;
         }
-        ++status_.singles;
         counters_.add(Count::kCameraSingles);
     }
-    status_.superseded += superseded / 2;
     counters_.add(Count::kCameraSuperseded, static_cast<std::uint64_t>(superseded / 2));
 }
 
@@ -324,6 +324,21 @@ void CameraSource::look_at_step() {
         tell(true, Sentence("the cameras are in step again"));
 }
 
+void CameraSource::look_at_losses() {
+    const std::int64_t now_ns = clock_.mono_ns();
+    if (now_ns < losses_quiet_until_ns_) return;
+    for (std::size_t eye = 0; eye < (config_.side_by_side ? 1 : 2); ++eye) {
+        if (lost_[eye] == 0 && damaged_[eye] == 0) continue;
+        tell(false,
+             Sentence::of("%s lost %lld pictures and gave %lld damaged ones; look at its cable, its bus and "
+                          "the load",
+                          config_.side_by_side ? kStereoName : kEyeNames[eye],
+                          static_cast<long long>(lost_[eye]), static_cast<long long>(damaged_[eye])));
+        lost_[eye] = damaged_[eye] = 0;
+        losses_quiet_until_ns_ = now_ns + kLossesQuietNs;
+    }
+}
+
 void CameraSource::on_fault(const Fault& fault) {
     status_.last_fault = fault.sentence;
     apply(CameraEvent::failed(fault.kind));
@@ -349,7 +364,6 @@ void CameraSource::apply(const CameraEvent& event) {
     if (step.action == CameraAction::kClose) {
         close_devices();
         if (was_open) {
-            ++status_.restarts;
             counters_.add(Count::kCameraRestarts);
         }
     }
@@ -367,7 +381,6 @@ void CameraSource::apply(const CameraEvent& event) {
 void CameraSource::close_devices() {
     drop(pairing_.reset(), false);
     if (both_) {
-        ++status_.superseded;
         counters_.add(Count::kCameraSuperseded);
         both_.reset();
     }

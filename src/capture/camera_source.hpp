@@ -34,19 +34,11 @@ struct CameraSourceConfig {
     verdict::FollowLimits follow;
 };
 
-// For health. NaN where not measured; eyes are left, right.
+// For health, next to the counters. NaN where not measured; eyes are left, right.
 struct CameraStatus {
     verdict::CameraState state = verdict::CameraState::kAbsent;
     verdict::CameraFault fault = verdict::CameraFault::kNone;  // why it is closed
     bool out_of_step = false;  // both eyes deliver, but nothing pairs: verdict Reason::kUnsynchronised
-    std::array<std::int64_t, 2> pictures{};  // good ones
-    std::array<std::int64_t, 2> gaps{};      // missing by the devices' own numbers
-    std::array<std::int64_t, 2> damaged{};   // said so by the devices
-    std::int64_t singles = 0;                // pictures without one of the other eye
-    std::int64_t superseded =
-        0;                      // pairs nobody took: a newer one replaced them, or a fault closed the camera
-    std::int64_t left_out = 0;  // stale or empty buffers after a start
-    std::int64_t restarts = 0;  // closed for a fault or a stall
     double skew_ms =
         std::numeric_limits<double>::quiet_NaN();  // right minus left; how far apart while out of step
     double drift_ppm =
@@ -133,6 +125,7 @@ class CameraSource final : public FrameSource {
     void measure(const StereoFrame& frame);
     void look_at_exposure();
     void look_at_step();
+    void look_at_losses();
     void on_fault(const Fault& fault);
     Sentence stall_sentence() const;
     void apply(const verdict::CameraEvent& event);
@@ -173,6 +166,10 @@ class CameraSource final : public FrameSource {
     std::int64_t left_out_seen_ = 0;  // of the driver, counted already
     bool out_of_step_told_ = false;
     std::int64_t step_quiet_until_ns_ = 0;
+    // Since last told, by eye: missing by the devices' own numbers, and damaged by their own word.
+    std::array<std::int64_t, 2> lost_{};
+    std::array<std::int64_t, 2> damaged_{};
+    std::int64_t losses_quiet_until_ns_ = 0;
     bool handed_over_ = false;           // a pair, by the last next()
     std::int64_t exposure_look_ns_ = 0;  // when to ask the cameras again what they expose
     bool follows_ = false;

@@ -299,13 +299,11 @@ TEST(CameraSource, PairsComeWithStampsPixelsAndFigures) {
     EXPECT_EQ(robot.frame.right.at(5, 5), 190);
     const CameraStatus status = robot.source->status();
     EXPECT_EQ(status.state, State::kRunning);
-    EXPECT_EQ(status.pictures, (std::array<std::int64_t, 2>{91, 91}));
     EXPECT_DOUBLE_EQ(status.skew_ms, 1.5);
     EXPECT_DOUBLE_EQ(status.exposure_difference_ms, 2.0);
     EXPECT_DOUBLE_EQ(status.mean[0], 90.0);
     EXPECT_DOUBLE_EQ(status.mean[1], 190.0);
     EXPECT_DOUBLE_EQ(status.saturated_share[1], 0.0);
-    EXPECT_EQ(status.left_out, 3);
     EXPECT_EQ(robot.count(Count::kCameraLeftOut), 3U);
     EXPECT_EQ(robot.count(Count::kCameraSingles), 0U);
     EXPECT_EQ(robot.count(Count::kCameraGaps), 0U);
@@ -351,7 +349,6 @@ TEST(CameraSource, ComesBackAfterEachOfTenReplugs) {
     }
     EXPECT_EQ(robot.notices.size(), 21U) << "one line for each change";
     EXPECT_EQ(robot.count(Count::kCameraRestarts), 10U);
-    EXPECT_EQ(robot.source->status().restarts, 10);
     // Opened, found absent a few times, closed as often.
     EXPECT_EQ(robot.cameras->closed, robot.cameras->opened - 1);
 }
@@ -486,6 +483,21 @@ TEST(CameraSource, APictureThatCannotBeUnpackedIsABadPairWithASentence) {
     EXPECT_GT(robot.pairs, 25);
 }
 
+TEST(CameraSource, WhichEyeLosesPicturesIsToldAtMostOnceAMinute) {
+    Robot robot;
+    for (int i = 0; i < 100; ++i)
+        robot.world.at(2.0 + i, [&] { robot.cameras->eyes[1].lost = 3; });
+    robot.world.at(10.0, [&] { robot.cameras->eyes[0].damaged = true; });
+    robot.world.at(10.99, [&] { robot.cameras->eyes[0].damaged = false; });
+    robot.run_until(130.0);
+    ASSERT_EQ(robot.notices.size(), 5U);
+    const std::string advice = "; look at its cable, its bus and the load";
+    EXPECT_EQ(robot.notices[1], "- the right camera lost 3 pictures and gave 0 damaged ones" + advice);
+    EXPECT_EQ(robot.notices[2], "- the left camera lost 0 pictures and gave 30 damaged ones" + advice);
+    EXPECT_EQ(robot.notices[3], "- the right camera lost 180 pictures and gave 0 damaged ones" + advice);
+    EXPECT_EQ(robot.notices[4], "- the right camera lost 117 pictures and gave 0 damaged ones" + advice);
+}
+
 TEST(CameraSource, ACameraThatGivesNothingUsableIsOpenedAgain) {
     for (const bool side_by_side : {false, true}) {
         Robot robot(side_by_side);
@@ -540,11 +552,7 @@ TEST(CameraSource, ASlowReaderGetsTheNewestPairAndTheRestIsCounted) {
     EXPECT_LT(robot.world.now_ns - robot.last_exposure_ns, 300 * kMs);
     const auto superseded = static_cast<std::int64_t>(robot.count(Count::kCameraSuperseded));
     const auto gaps = static_cast<std::int64_t>(robot.count(Count::kCameraGaps));
-    const CameraStatus status = robot.source->status();
-    EXPECT_EQ(status.superseded, superseded);
-    EXPECT_EQ(status.gaps[0] + status.gaps[1], gaps);
-    EXPECT_EQ(robot.pairs + superseded + status.gaps[0],
-              robot.cameras->eyes[0].next - robot.cameras->eyes[0].lost)
+    EXPECT_EQ(robot.pairs + superseded + gaps / 2, robot.cameras->eyes[0].next - robot.cameras->eyes[0].lost)
         << "each picture is somewhere";
     EXPECT_EQ(robot.count(Count::kCameraRestarts), 0U);
 }
@@ -603,7 +611,6 @@ TEST(CameraSource, APictureSideBySideThatAFaultOvertakesIsCounted) {
     robot.run_until(2.1);
     EXPECT_EQ(robot.count(Count::kCameraRestarts), 1U);
     EXPECT_EQ(accounted(), robot.cameras->eyes[0].next);
-    EXPECT_EQ(robot.source->status().superseded, 1);
 }
 
 TEST(CameraSource, TheRightCameraFollowsTheLeftOnesExposure) {
