@@ -682,7 +682,7 @@ TEST(CameraSource, NoPairWaitsForALookAtTheExposure) {
             copied = false;
             robot.source->next(robot.frame);
         }
-        EXPECT_NEAR(looks / 2, follow ? 20 : 10, 1);
+        EXPECT_NEAR(looks, follow ? 40 : 20, 3);
         robot.cameras->on_call = nullptr;
     }
 }

@@ -22,7 +22,7 @@ struct Play {
     explicit Play(PairingConfig config = {}) : pairing(config) {}
 
     // Adds pictures as "eye, ms" in this order; tokens are their positions.
-    void add(std::vector<std::pair<int, int>> frames) {
+    void add(const std::vector<std::pair<int, int>>& frames) {
         for (const auto& [eye, ms] : frames) {
             const int token = next_token++;
             for (const auto& drop : pairing.add({eye, ms * kMs, token}))

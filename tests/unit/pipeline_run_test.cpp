@@ -136,8 +136,8 @@ struct Run {
     std::vector<std::int64_t> bad;
 };
 
-std::unique_ptr<Run> run_pipeline(FrameSource& source, RecordingSink& sink, RunOptions options, int threads,
-                                  const std::atomic<bool>& stop) {
+std::unique_ptr<Run> run_pipeline(FrameSource& source, RecordingSink& sink, const RunOptions& options,
+                                  int threads, const std::atomic<bool>& stop) {
     auto run = std::make_unique<Run>();
     sink.positions.reserve(100000);
     sink.hashes.reserve(100000);
