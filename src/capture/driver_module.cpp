@@ -13,8 +13,10 @@ std::vector<std::filesystem::path> module_folders() {
     std::vector<std::filesystem::path> folders;
     std::error_code error;
     const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", error);
-    if (!error) folders.push_back(program.parent_path());
-    folders.emplace_back(GROUNDLINE_MODULE_FOLDER);
+    if (error) return folders;
+    folders.push_back(program.parent_path());
+    // Seen from the programs, so that one build can be installed or packaged for any prefix.
+    folders.push_back((program.parent_path() / GROUNDLINE_MODULE_FOLDER).lexically_normal());
     return folders;
 }
 

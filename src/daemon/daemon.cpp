@@ -22,6 +22,7 @@
 #include "daemon/supervisor.hpp"
 #include "pipeline/worker_pool.hpp"
 #include "publish/health_publisher.hpp"
+#include "publish/lcm_link.hpp"
 #include "publish/lcm_publisher.hpp"
 #include "setup/run_setup.hpp"
 
@@ -222,6 +223,10 @@ void prepare_signals() {
     for (const int each : {SIGTERM, SIGINT})
         sigaction(each, &action, nullptr);
     signal(SIGPIPE, SIG_IGN);
+}
+
+std::string configured_loopback_group(const DaemonOptions& options) {
+    return publish::loopback_group(publish::resolve_url(read_settings(options).publish.url));
 }
 
 ExitStatus run_daemon(const DaemonOptions& options) {

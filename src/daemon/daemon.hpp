@@ -23,6 +23,10 @@ struct DaemonOptions {
 // program at once with status 0, also where a file or a device does not answer; SIGHUP waits.
 void prepare_signals();
 
+// The multicast group that the configured LCM messages stay on this computer with, empty where they leave it
+// or need none. Throws Refusal as run_daemon() does for a configuration.
+std::string configured_loopback_group(const DaemonOptions& options);
+
 // Returns when a recording ended, a thread failed, or SIGTERM or SIGINT came; after such a signal the program
 // ends within a second whatever hangs, if need be from inside here with status 0. Throws Refusal for what can
 // be told before the first frame.

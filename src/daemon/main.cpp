@@ -32,6 +32,10 @@ int run(int argc, char** argv) {
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
     app.add_flag("--check-config", options.check_only,
                  "Set everything up as a start would, say whether it is good, and end");
+    bool print_group = false;
+    app.add_flag("--print-loopback-group", print_group,
+                 "Print the multicast group of LCM messages that stay on this computer (ttl=0), or nothing, "
+                 "and end");
     app.footer(
         "SIGTERM ends it within a second, SIGHUP reads the configuration again; keys marked (reload) in\n"
         "`groundline config` are taken over. Exit status: 0 told to end, or the recording ended; 1 failed;\n"
@@ -44,6 +48,10 @@ int run(int argc, char** argv) {
         return fail(ExitStatus::kUsage, fmt::format("{}; see groundlined --help", misuse.what()));
     }
     options.config_named = config->count() > 0;
+    if (print_group) {
+        fmt::print("{}\n", groundline::daemon::configured_loopback_group(options));
+        return static_cast<int>(ExitStatus::kDone);
+    }
     return static_cast<int>(groundline::daemon::run_daemon(options));
 }
 

@@ -61,6 +61,24 @@ std::string resolve_url(const std::string& argument) {
     return std::string(kDefaultUrl);
 }
 
+std::string loopback_group(const std::string& url) {
+    if (provider_of(url) != kMulticast) return {};
+    std::string_view options = url;
+    options.remove_prefix(std::min(options.find('?'), options.size()));
+    std::string_view ttl = "0";  // LCM's default
+    while (!options.empty()) {
+        options.remove_prefix(1);  // ? or &
+        const std::string_view option = options.substr(0, options.find('&'));
+        if (option.starts_with("ttl=")) ttl = option.substr(4);
+        options.remove_prefix(option.size());
+    }
+    const std::string group = multicast_address(url);
+    in_addr address{};
+    const bool multicast =
+        inet_pton(AF_INET, group.c_str(), &address) == 1 && IN_MULTICAST(ntohl(address.s_addr));
+    return multicast && ttl == "0" ? group : std::string();
+}
+
 LcmLink::LcmLink(std::string url) : url_(std::move(url)) {
     if (std::ranges::find(kProviders, provider_of(url_)) == kProviders.end())
         throw Refusal(

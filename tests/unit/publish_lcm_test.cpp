@@ -5,6 +5,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
 #include <cstdlib>
 #include <filesystem>
 #include <map>
@@ -369,6 +370,31 @@ TEST(Lcm, WhereTheUrlComesFrom) {
     EXPECT_EQ(LcmPublisher(options_for("")).url(), "memq://");
     EXPECT_EQ(resolve_url("udpm://239.255.76.67:7999?ttl=0"), "udpm://239.255.76.67:7999?ttl=0");
     ASSERT_EQ(unsetenv("LCM_DEFAULT_URL"), 0);
+}
+
+TEST(LoopbackGroup, IsTheGroupOfMessagesThatStayOnThisComputer) {
+    struct Row {
+        const char* url;
+        const char* group;
+    };
+    const std::array rows = {
+        Row{"udpm://239.255.76.67:7667?ttl=0", "239.255.76.67"},
+        Row{"udpm://239.1.2.3:7000?ttl=0&recv_buf_size=100000", "239.1.2.3"},
+        Row{"udpm://239.1.2.3:7000?recv_buf_size=100000&ttl=0", "239.1.2.3"},
+        Row{"udpm://239.1.2.3", "239.1.2.3"},
+        Row{"udpm://", "239.255.76.67"},
+        Row{"udpm://?ttl=0", "239.255.76.67"},
+        Row{"udpm://239.255.76.67:7667?ttl=1", ""},
+        Row{"udpm://239.255.76.67:7667?ttl=0&ttl=1", ""},
+        Row{"udpm://239.255.76.67:7667?ttl=", ""},
+        Row{"udpm://:7667?recv_buf_size=9&ttl=1", ""},
+        Row{"udpm://10.0.0.7:7667?ttl=0", ""},  // not multicast: its route is none of ours
+        Row{"udpm://robot:7667?ttl=0", ""},
+        Row{"tcpq://239.255.76.67:7700", ""},
+        Row{"memq://", ""},
+    };
+    for (const Row& row : rows)
+        EXPECT_EQ(loopback_group(row.url), row.group) << row.url;
 }
 
 // A port of this process, so that test programs that run at once do not hear each other.
