@@ -39,6 +39,7 @@ struct LcmPublisher::Parts {
           v_disparity_channel(from.prefix + std::string(kLongestSuffix)),
           preview_channel(from.prefix + "_PREVIEW"),
           grid_channel(from.prefix + "_GRID"),
+          obstacles_channel(from.prefix + "_OBSTACLES"),
           link(resolve_url(from.url)),
           own_tracker(from.counters, from.stale_after_ns),
           tracker(from.tracker != nullptr ? *from.tracker : own_tracker),
@@ -81,6 +82,7 @@ struct LcmPublisher::Parts {
     std::string v_disparity_channel;
     std::string preview_channel;
     std::string grid_channel;
+    std::string obstacles_channel;
     LcmLink link;
     HealthTracker own_tracker;
     HealthTracker& tracker;
@@ -110,6 +112,7 @@ bool LcmPublisher::consume(const FrameResult& result) {
     if (parts.preview.load(std::memory_order_relaxed))
         good &= parts.send(parts.preview_channel, encoder.preview(result));
     if (channels.grid) good &= parts.send(parts.grid_channel, encoder.grid(result));
+    if (channels.obstacles) good &= parts.send(parts.obstacles_channel, encoder.obstacles(result));
     const std::int64_t end_ns = parts.now();
     parts.tracker.note(result, end_ns - start_ns, end_ns);
     if (parts.health_due()) good &= parts.send_health();

@@ -21,6 +21,7 @@ struct Channels {
     bool v_disparity = false;
     bool preview = false;
     bool grid = false;
+    bool obstacles = false;
 };
 
 struct LcmOptions {

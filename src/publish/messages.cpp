@@ -11,6 +11,7 @@
 #include "groundline/health_t.hpp"
 #include "groundline/image_t.hpp"
 #include "groundline/mask_t.hpp"
+#include "groundline/obstacles_t.hpp"
 #include "groundline/sectors_t.hpp"
 #include "groundline/vdisparity_t.hpp"
 #include "publish/mask_codec.hpp"
@@ -85,6 +86,8 @@ constexpr double kRoughnessScaleM = 0.002;
 constexpr double kStepScaleM = 0.005;
 constexpr double kIndexScale = 1.0 / 250.0;
 static_assert(10 * kMaxGridCells + 200 <= kMaxMessageBytes);
+static_assert(obstacles_t::MOST == kMaxObstacles);
+static_assert(100 * kMaxObstacles + 100 <= kMaxMessageBytes);
 constexpr std::size_t kHealthCounters = static_cast<std::size_t>(Count::kCount) + 1;
 constexpr std::size_t kHealthLatencies = static_cast<std::size_t>(Stage::kCount) + 1;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
@@ -159,6 +162,7 @@ struct MessageEncoder::Parts {
     ground_t ground;
     vdisparity_t v_disparity;
     grid_t grid;
+    obstacles_t obstacles;
     image_t preview;
     health_t health;
 
@@ -169,6 +173,7 @@ struct MessageEncoder::Parts {
         preview.data.resize(kMaxDataBytes);
         preview.nmetadata = 0;
         sectors.sectors.resize(kMaxSectors);
+        obstacles.obstacles.resize(kMaxObstacles);
         for (std::vector<std::uint8_t>* bytes :
              {&grid.kind, &grid.index, &grid.slope, &grid.roughness, &grid.step, &grid.points})
             bytes->resize(kMaxGridCells);
@@ -369,6 +374,35 @@ MessageEncoder::Bytes MessageEncoder::preview(const FrameResult& result) {
             const auto pixels = static_cast<unsigned>((bottom - top) * (last - first));
             to = std::ranges::copy(tinted((sum + pixels / 2) / pixels, gravest), to).out;
         }
+    }
+    return parts_->encode(out);
+}
+
+MessageEncoder::Bytes MessageEncoder::obstacles(const FrameResult& result) {
+    obstacles_t& out = parts_->obstacles;
+    set_head(out, result);
+    const std::size_t count = result.verdict == Verdict::kBlind ? 0 : result.obstacles.size();
+    const bool metric = result.rig.calibrated && result.ground.metric;
+    out.count = static_cast<std::int32_t>(count);
+    for (std::size_t i = 0; i < count; ++i) {
+        const Obstacle& from = result.obstacles[i];
+        obstacle_t& to = out.obstacles[i];
+        to.kind = static_cast<std::int8_t>(from.kind);
+        to.overhang = static_cast<std::int8_t>(from.overhang);
+        to.left = from.left;
+        to.top = from.top;
+        to.right = from.right;
+        to.bottom = from.bottom;
+        to.pixels = from.pixels;
+        to.disparity_px = wire(from.disparity_px);
+        to.range_m = wire_if(metric, from.range_m);
+        to.range_sigma_m = wire_if(metric, from.range_sigma_m);
+        to.bearing_rad = wire_if(metric, from.bearing_rad);
+        to.left_rad = wire_if(metric, from.left_rad);
+        to.right_rad = wire_if(metric, from.right_rad);
+        to.width_m = wire_if(metric, from.width_m);
+        to.height_m = wire_if(metric, from.height_m);
+        to.lowest_m = wire_if(metric, from.lowest_m);
     }
     return parts_->encode(out);
 }

@@ -35,6 +35,7 @@ class MessageEncoder {
     Bytes preview(const FrameResult& result);
     // Empty where the result has no grid.
     Bytes grid(const FrameResult& result);
+    Bytes obstacles(const FrameResult& result);
     Bytes health(const HealthReport& report);
     // The sectors_t that says that no pairs arrive; stamps are those of sending.
     Bytes sectors_without_frames(std::int64_t now_utime_us, std::int64_t now_mono_ns);

@@ -439,6 +439,8 @@ std::vector<Key> make_keys() {
                                      GROUNDLINE_MEMBER(publish.v_disparity))));
     keys.push_back(reloadable(on_off("publish.preview", "Publish a small picture of the left view too.",
                                      GROUNDLINE_MEMBER(publish.preview))));
+    keys.push_back(on_off("publish.obstacles", "Publish the things in the mask as a list too.",
+                          GROUNDLINE_MEMBER(publish.obstacles)));
 
     keys.push_back(on_off("grid.publish",
                           "Grade the ground cell by cell (elevation, slope, roughness, step, traversability "

@@ -69,6 +69,7 @@ struct PublishSettings {
     std::string prefix = "GROUNDLINE";  // channels are PREFIX_MASK, PREFIX_SECTORS, ...
     bool v_disparity = false;
     bool preview = false;
+    bool obstacles = false;
 };
 
 // Const while a pipeline runs. Defaults are the member initialisers here and in the rooms' own structs.

@@ -64,6 +64,7 @@ publish::LcmOptions lcm_options(const settings::Settings& settings, Counters& co
     options.channels.v_disparity = settings.publish.v_disparity;
     options.channels.preview = settings.publish.preview;
     options.channels.grid = settings.grid.on;
+    options.channels.obstacles = settings.publish.obstacles;
     options.counters = &counters;
     return options;
 }

@@ -309,7 +309,8 @@ TEST_F(Daemon, ThreadsOfFramesAllocateLockAndWriteNothing) {
     Receiver receiver(lcm_url());
     Start with =
         start({"--set", "capture.source=plane?width=64&height=48&focal=50&rate_hz=200&frames=100000", "--set",
-               "process.threads=2", "--set", "publish.preview=on", "--set", "publish.v_disparity=on"});
+               "process.threads=2", "--set", "publish.preview=on", "--set", "publish.v_disparity=on", "--set",
+               "publish.obstacles=on", "--set", "grid.publish=on"});
     const std::string result = folder_.at("forbidden");
     with.environment = {{"LD_PRELOAD", GROUNDLINE_FORBIDDEN_PRELOAD}, {"GROUNDLINE_FORBIDDEN", result}};
     Service service(with);

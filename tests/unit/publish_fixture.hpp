@@ -64,6 +64,10 @@ struct Frame {
         result.range_limit_m = 11.5;
         result.sectors.push_back({0.25, 0.5, true, true, TerrainClass::kDrop, 3.5, 0.125, 2.5, 0.75});
         result.sectors.push_back({-0.25, 0.5, false, false, TerrainClass::kUnknown, 0.0, 0.0, 6.5, 1.0});
+        result.obstacles.push_back({TerrainClass::kObstacle, false, 3, 1, 5, 2, 6, 12.5, 5.25, 0.0625, -0.125,
+                                    0.0625, -0.25, 1.5, 0.75, -0.03125});
+        result.obstacles.push_back(
+            {TerrainClass::kDrop, true, 0, 0, 1, 3, 4, 2.5, 25.0, 0.5, 0.375, 0.5, 0.25, 3.0, 2.5, 2.25});
         result.grid.cells = arena.take<GridCell>(6);
         result.grid.rows = 2;
         result.grid.columns = 3;

@@ -119,7 +119,8 @@ TEST(Lcm, ChannelsAndPrefix) {
                         .health = false,
                         .v_disparity = true,
                         .preview = true,
-                        .grid = true};
+                        .grid = true,
+                        .obstacles = true};
     LcmPublisher publisher(options);
     const Frame frame(64, 48);
     ASSERT_TRUE(publisher.consume(frame.result));
@@ -131,9 +132,9 @@ TEST(Lcm, ChannelsAndPrefix) {
     fake_now_ns += 1000 * kMs;
     ASSERT_TRUE(publisher.tick());
     drain(publisher.handle());
-    ASSERT_EQ(inbox.size(), 4U);
-    for (const char* channel :
-         {"ROBOT7_EYES_MASK", "ROBOT7_EYES_VDISPARITY", "ROBOT7_EYES_PREVIEW", "ROBOT7_EYES_GRID"})
+    ASSERT_EQ(inbox.size(), 5U);
+    for (const char* channel : {"ROBOT7_EYES_MASK", "ROBOT7_EYES_VDISPARITY", "ROBOT7_EYES_PREVIEW",
+                                "ROBOT7_EYES_GRID", "ROBOT7_EYES_OBSTACLES"})
         EXPECT_EQ(inbox[channel].size(), 1U) << channel;
 }
 

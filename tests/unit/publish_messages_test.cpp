@@ -15,6 +15,7 @@
 #include "groundline/image_t.hpp"
 #include "groundline/mask_decoder.hpp"
 #include "groundline/mask_t.hpp"
+#include "groundline/obstacles_t.hpp"
 #include "groundline/sectors_t.hpp"
 #include "groundline/vdisparity_t.hpp"
 #include "publish/mask_codec.hpp"
@@ -93,6 +94,7 @@ TEST(Messages, FingerprintsAreThoseThatOthersCompiledAgainst) {
     EXPECT_EQ(static_cast<std::uint64_t>(health_t::getHash()), 0x50beec97c7e42e58U);
     EXPECT_EQ(static_cast<std::uint64_t>(vdisparity_t::getHash()), 0xc372905163392668U);
     EXPECT_EQ(static_cast<std::uint64_t>(grid_t::getHash()), 0xe719f93181ce58e1U);
+    EXPECT_EQ(static_cast<std::uint64_t>(obstacles_t::getHash()), 0x852949dfa65e8652U);
     // bot_core.image_t: members 0x6fee6cb20472ff6a plus its image_metadata_t, rotated by one.
     EXPECT_EQ(static_cast<std::uint64_t>(image_t::getHash()), 0x14739ffe13d5f5f0U);
 }
@@ -234,6 +236,42 @@ TEST(Messages, TheLargestGridFitsADatagramAndComesBack) {
     EXPECT_TRUE(encoder.grid(frame.result).empty());
 }
 
+TEST(Messages, ObstaclesBytes) {
+    Frame frame(8, 4);
+    MessageEncoder encoder;
+    Golden golden;
+    golden.fingerprint(0x852949dfa65e8652).head(2, 0x4).i32(2);
+    golden.i8(2).i8(0).i32(3).i32(1).i32(5).i32(2).i32(6);
+    golden.reals({12.5, 5.25, 0.0625, -0.125, 0.0625, -0.25, 1.5, 0.75, -0.03125});
+    golden.i8(3).i8(1).i32(0).i32(0).i32(1).i32(3).i32(4);
+    golden.reals({2.5, 25.0, 0.5, 0.375, 0.5, 0.25, 3.0, 2.5, 2.25});
+    EXPECT_EQ(copy(encoder.obstacles(frame.result)), golden.bytes);
+
+    frame.result.rig.calibrated = false;
+    const auto uncalibrated = read<obstacles_t>(encoder.obstacles(frame.result));
+    ASSERT_EQ(uncalibrated.count, 2);
+    EXPECT_EQ(uncalibrated.obstacles[0].disparity_px, 12.5);
+    for (const double metres : {uncalibrated.obstacles[0].range_m, uncalibrated.obstacles[0].bearing_rad,
+                                uncalibrated.obstacles[1].width_m, uncalibrated.obstacles[1].height_m})
+        EXPECT_TRUE(std::isnan(metres));
+}
+
+TEST(Messages, AFullListOfObstaclesFitsADatagramAndComesBack) {
+    Frame frame(8, 4);
+    frame.result.obstacles.clear();
+    for (int i = 0; i < obstacles_t::MOST; ++i) {
+        Obstacle obstacle;
+        obstacle.pixels = i;
+        frame.result.obstacles.push_back(obstacle);
+    }
+    MessageEncoder encoder;
+    const MessageEncoder::Bytes bytes = encoder.obstacles(frame.result);
+    EXPECT_LE(bytes.size() + 63 + 1, 65499U);
+    const auto message = read<obstacles_t>(bytes);
+    ASSERT_EQ(message.count, 128);
+    EXPECT_EQ(message.obstacles[127].pixels, 127);
+}
+
 HealthReport full_report() {
     HealthReport report;
     report.utime_us = 99;
@@ -363,6 +401,7 @@ TEST(Messages, BlindShowsNothingWhateverTheResultHolds) {
 
     const auto v_disparity = read<vdisparity_t>(encoder.v_disparity(frame.result));
     EXPECT_TRUE(std::isnan(v_disparity.line_slope));
+    EXPECT_EQ(read<obstacles_t>(encoder.obstacles(frame.result)).count, 0);
     const auto grid = read<grid_t>(encoder.grid(frame.result));
     ASSERT_EQ(grid.cells, 6);
     for (std::size_t k = 0; k < 6; ++k) {
