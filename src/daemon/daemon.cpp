@@ -21,6 +21,7 @@
 #include "daemon/service_manager.hpp"
 #include "daemon/supervisor.hpp"
 #include "pipeline/worker_pool.hpp"
+#include "publish/attitude_receiver.hpp"
 #include "publish/health_publisher.hpp"
 #include "publish/lcm_link.hpp"
 #include "publish/lcm_publisher.hpp"
@@ -34,6 +35,7 @@ using std::chrono::milliseconds;
 // SIGTERM promises the end within a second; what is left after waiting is for the log and the destructors.
 constexpr milliseconds kPatience{600};
 constexpr suseconds_t kDeadlineUs = 900'000;
+constexpr int kAttitudeWaitMs = 100;
 
 settings::Settings read_settings(const DaemonOptions& options) {
     const bool read = options.config_named || std::filesystem::exists(options.config);
@@ -92,6 +94,7 @@ struct Parts {
           tracker(&counters, stale_after_ns(info())),
           publisher(lcm_options(settings, counters, &tracker)),
           health(lcm_options(settings, counters)),
+          attitude_receiver(lcm_options(settings, counters), attitudes),
           sinks{{{&publisher, Stage::kPublish, false}}},
           running(*driver.opened.source, processor, sinks, false, arena, counters) {
         arena.seal();
@@ -106,6 +109,10 @@ struct Parts {
             options.stamp_when_due = true;
             options.loop = settings.capture.loop;
         }
+        if (settings.attitude.input) {
+            options.attitude = &attitudes;
+            options.attitude_max_gap_ns = static_cast<std::int64_t>(1e6 * settings.attitude.max_gap_ms);
+        }
         options.on_thread = [this](pipeline::ThreadRole role) {
             // A renderer is no camera: it may take all the time there is, and more.
             if (role != pipeline::ThreadRole::kCapture || !driver.opened.rig) real_time.adopt(role);
@@ -114,6 +121,12 @@ struct Parts {
         // Counted by the pipeline; the supervisor says so.
         running.run(
             options, stop, [](const FrameStamp&, const std::string&) {}, report);
+    }
+
+    // On a thread of its own, where attitude.input is on.
+    void receive_attitudes(const std::atomic<bool>& stop) {
+        while (!stop.load())
+            attitude_receiver.receive(kAttitudeWaitMs);
     }
 
     // Reads the configuration again and takes over what a running pipeline can.
@@ -164,6 +177,8 @@ struct Parts {
     publish::HealthTracker tracker;
     publish::LcmPublisher publisher;
     publish::HealthPublisher health;
+    pipeline::AttitudeHandOver attitudes{{}};
+    publish::AttitudeReceiver attitude_receiver;
     std::array<pipeline::SinkSlot, 1> sinks;
     pipeline::Pipeline running;
     pipeline::RunReport report;
@@ -245,10 +260,12 @@ ExitStatus run_daemon(const DaemonOptions& options) {
     std::string failure;  // of the pipeline's start; written before pipeline_ended, like the report
     std::atomic<bool> pipeline_ended{false};
     std::atomic<bool> health_ended{false};
+    std::atomic<bool> attitude_ended{!parts->settings.attitude.input};
     Supervisor supervisor({parts->running, parts->counters, parts->tracker, parts->health, manager,
                            parts->real_time, parts->driver.cameras, pipeline_ended,
                            [&] { parts->reload(options); }});
     std::jthread health;
+    std::jthread attitude;
     std::jthread pipeline;
     // Whatever leaves this function, no thread may be waited for that was not told to end.
     struct EndThreads {
@@ -270,6 +287,12 @@ ExitStatus run_daemon(const DaemonOptions& options) {
         supervisor.send_health();
         health_ended = true;
     });
+    if (parts->settings.attitude.input)
+        attitude = std::jthread([&] {
+            pthread_setname_np(pthread_self(), "gl-attitude");
+            parts->receive_attitudes(stop);
+            attitude_ended = true;
+        });
     pipeline = std::jthread([&] {
         try {
             parts->run(stop);
@@ -293,7 +316,7 @@ ExitStatus run_daemon(const DaemonOptions& options) {
     manager.tell("STOPPING=1\nSTATUS=stopping");
     arm_deadline(status_so_far());
     end_threads();
-    const bool ended = wait_for(pipeline_ended) && wait_for(health_ended);
+    const bool ended = wait_for(pipeline_ended) && wait_for(health_ended) && wait_for(attitude_ended);
     if (!ended)
         log().warn("a camera or the network does not let go: the program ends without waiting for it");
     const ExitStatus status = status_so_far();

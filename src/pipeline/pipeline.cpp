@@ -112,6 +112,7 @@ void Pipeline::capture(const RunOptions& options, const std::atomic<bool>& stop,
     Pacer pacer(options.pace == Pace::kFixed ? static_cast<std::int64_t>(1e9 / options.rate_hz) : 0,
                 options.stamp_when_due ? Pacer::Late::kLeaveOut : Pacer::Late::kCatchUp);
     std::int64_t taken = 0;
+    const AttitudeHistory* attitudes = nullptr;
     while (options.frames < 0 || taken < options.frames) {
         if (stop.load(std::memory_order_relaxed)) {
             report.interrupted = true;
@@ -142,6 +143,12 @@ void Pipeline::capture(const RunOptions& options, const std::atomic<bool>& stop,
             const std::int64_t due_ns = pacer.due_ns(slot->frame.stamp.exposure_mono_ns, now_mono_ns());
             sleep_until(due_ns, stop);
             if (options.stamp_when_due) stamp_as_taken(due_ns, slot->frame.stamp);
+        }
+        if (options.attitude != nullptr) {
+            if (const AttitudeHistory* newest = options.attitude->newest()) attitudes = newest;
+            slot->frame.attitude = attitudes != nullptr ? attitudes->at(slot->frame.stamp.exposure_mono_ns,
+                                                                        options.attitude_max_gap_ns)
+                                                        : AttitudeInput{};
         }
         slot->arrival_mono_ns = now_mono_ns();
         counters_.add(Count::kFramesRead);

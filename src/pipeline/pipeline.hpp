@@ -16,6 +16,7 @@
 #include "core/function_ref.hpp"
 #include "core/latency_histogram.hpp"
 #include "core/sink.hpp"
+#include "pipeline/attitude_history.hpp"
 #include "pipeline/hand_over.hpp"
 #include "pipeline/processor.hpp"
 #include "pipeline/triple_buffer.hpp"
@@ -42,6 +43,10 @@ struct RunOptions {
     // without ever waiting and takes that for a thread gone wild (RLIMIT_RTTIME); under overload a frame
     // always waits already, so that without this a thread that is merely busy would be counted so too.
     bool rest = false;
+    // Borrowed: where the attitude at each pair's exposure comes from, and how far apart samples may be for
+    // that. Null: the source's own attitude, if it has one.
+    AttitudeHandOver* attitude = nullptr;
+    std::int64_t attitude_max_gap_ns = 0;
     // Called once on each thread before its first frame; empty: nothing.
     std::function<void(ThreadRole)> on_thread = {};
 };

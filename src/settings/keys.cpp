@@ -442,6 +442,14 @@ std::vector<Key> make_keys() {
     keys.push_back(on_off("publish.obstacles", "Publish the things in the mask as a list too.",
                           GROUNDLINE_MEMBER(publish.obstacles)));
 
+    keys.push_back(on_off("attitude.input",
+                          "Take the camera's attitude from the channel PREFIX_ATTITUDE: a step of the ground "
+                          "that it made too is believed.",
+                          GROUNDLINE_MEMBER(attitude.input)));
+    keys.push_back(number("attitude.max_gap_ms", 1.0, 1000.0,
+                          "How far from a picture's exposure, or apart about it, attitudes may be to count.",
+                          GROUNDLINE_MEMBER(attitude.max_gap_ms)));
+
     keys.push_back(on_off("grid.publish",
                           "Grade the ground cell by cell (elevation, slope, roughness, step, traversability "
                           "index) and publish that too.",

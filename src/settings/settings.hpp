@@ -72,6 +72,12 @@ struct PublishSettings {
     bool obstacles = false;
 };
 
+// What another sensor of the robot tells.
+struct AttitudeSettings {
+    bool input = false;
+    double max_gap_ms = 100.0;
+};
+
 // Const while a pipeline runs. Defaults are the member initialisers here and in the rooms' own structs.
 struct Settings {
     stereo::MatcherConfig matcher;
@@ -80,6 +86,7 @@ struct Settings {
     terrain::GridConfig grid;
     MountSettings mount;
     PublishSettings publish;
+    AttitudeSettings attitude;
     CaptureSettings capture;
     ProcessSettings process;
     RealtimeSettings realtime;

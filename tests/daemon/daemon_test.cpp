@@ -13,6 +13,7 @@
 #include <regex>
 
 #include "daemon/service.hpp"
+#include "groundline/attitude_t.hpp"
 #include "groundline/health_t.hpp"
 #include "groundline/mask_t.hpp"
 #include "groundline/sectors_t.hpp"
@@ -218,6 +219,23 @@ TEST_F(Daemon, AThreadThatStandsStillIsNamedAndTheWatchdogStarves) {
     }
 }
 
+TEST_F(Daemon, TakesAttitudesWhereItIsToldTo) {
+    Receiver robot(lcm_url());
+    const auto refused = [&] {
+        for (const counter_t& counter : robot.last<health_t>("GROUNDLINE_HEALTH").counters)
+            if (counter.name == "attitudes_refused") return counter.value;
+        return std::int64_t{-1};
+    };
+    Service service(start({"--set", "attitude.input=on"}));
+    ASSERT_TRUE(ready(service)) << service.said();
+    attitude_t attitude{};  // of 1970
+    ASSERT_TRUE(robot.until([&] { return robot.send("GROUNDLINE_ATTITUDE", attitude) && refused() > 0; }))
+        << service.said();
+    int status = -1;
+    service.end_ms(SIGTERM, status);
+    EXPECT_EQ(status, 0);
+}
+
 TEST_F(Daemon, WithoutPairsItSaysBlindAndShowsNoMask) {
     Receiver receiver(lcm_url());
     Service service(start());
@@ -310,7 +328,7 @@ TEST_F(Daemon, ThreadsOfFramesAllocateLockAndWriteNothing) {
     Start with =
         start({"--set", "capture.source=plane?width=64&height=48&focal=50&rate_hz=200&frames=100000", "--set",
                "process.threads=2", "--set", "publish.preview=on", "--set", "publish.v_disparity=on", "--set",
-               "publish.obstacles=on", "--set", "grid.publish=on"});
+               "publish.obstacles=on", "--set", "grid.publish=on", "--set", "attitude.input=on"});
     const std::string result = folder_.at("forbidden");
     with.environment = {{"LD_PRELOAD", GROUNDLINE_FORBIDDEN_PRELOAD}, {"GROUNDLINE_FORBIDDEN", result}};
     Service service(with);

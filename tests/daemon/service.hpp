@@ -100,6 +100,13 @@ class Receiver {
     void forget() { inbox_.clear(); }
 
     template <typename Message>
+    bool send(const std::string& channel, const Message& message) {
+        Bytes bytes(static_cast<std::size_t>(message.getEncodedSize()));
+        message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+        return lcm_publish(lcm_, channel.c_str(), bytes.data(), static_cast<unsigned>(bytes.size())) == 0;
+    }
+
+    template <typename Message>
     Message last(const std::string& channel) {
         Message message{};
         if (const auto& all = inbox_[channel]; !all.empty())

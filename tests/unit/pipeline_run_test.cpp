@@ -1,6 +1,7 @@
 // The whole pipeline over a scripted source: order, losses, failures, ends, and what the hot path allocates.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <functional>
@@ -104,6 +105,7 @@ class RecordingSink final : public Sink {
         if (delay_ms > 0) std::this_thread::sleep_for(std::chrono::milliseconds(delay_ms));
         if (static_cast<std::int64_t>(positions.size()) == fail_after) return false;
         positions.push_back(result.stamp.position);
+        attitudes.push_back(result.evidence.attitude);
         if (forbidden_by_frame.capacity() > forbidden_by_frame.size())
             forbidden_by_frame.emplace_back(test::allocations(), test::mutex_locks());
         std::uint64_t hash = 1469598103934665603ULL;
@@ -123,6 +125,7 @@ class RecordingSink final : public Sink {
     int delay_ms = 0;
     std::int64_t fail_after = -1;
     std::vector<std::int64_t> positions;
+    std::vector<AttitudeInput> attitudes;
     std::vector<std::uint64_t> hashes;
     std::vector<std::pair<std::uint64_t, std::uint64_t>> forbidden_by_frame;  // allocations and locks so far
 
@@ -141,6 +144,7 @@ std::unique_ptr<Run> run_pipeline(FrameSource& source, RecordingSink& sink, cons
     auto run = std::make_unique<Run>();
     sink.positions.reserve(100000);
     sink.hashes.reserve(100000);
+    sink.attitudes.reserve(100000);
     Arena arena;
     const rig::Rectifier rectifier(kWidth, kHeight);
     WorkerPool pool(threads);
@@ -183,6 +187,35 @@ TEST(Pipeline, ResultsDoNotDependOnThreadsOrRuns) {
         EXPECT_EQ(sink.hashes, first) << threads << " threads";
     }
     ASSERT_EQ(first.size(), 5U);
+}
+
+// Pairs are exposed at 0, 1, 2 ... ms; the input knows 0 to 8 ms, and 4 ms on.
+TEST(Pipeline, EachPairGetsTheAttitudeAtItsExposure) {
+    AttitudeHandOver inbox{{}};
+    AttitudeHistory history;
+    for (const int ms : {0, 4, 8})
+        history.add({ms * 1'000'000, 0.01 * ms, -0.02 * ms, 0.001});
+    *inbox.begin_write() = history;
+    inbox.commit();
+    RunOptions options;
+    options.attitude = &inbox;
+    options.attitude_max_gap_ns = 4'000'000;
+    ScriptedSource source(16);
+    RecordingSink sink;
+    run_pipeline(source, sink, options, 1, kNeverStop);
+    ASSERT_EQ(sink.attitudes.size(), 16U);
+    for (int ms = 0; ms < 16; ++ms) {
+        const AttitudeInput& attitude = sink.attitudes[static_cast<std::size_t>(ms)];
+        ASSERT_EQ(attitude.valid, ms <= 12) << ms;
+        if (!attitude.valid) continue;
+        EXPECT_NEAR(attitude.pitch_rad, 0.01 * std::min(ms, 8), 1e-12) << ms;
+        EXPECT_NEAR(attitude.roll_rad, -0.02 * std::min(ms, 8), 1e-12) << ms;
+    }
+
+    ScriptedSource without(2);
+    RecordingSink other;
+    run_pipeline(without, other, {}, 1, kNeverStop);
+    EXPECT_FALSE(other.attitudes.at(1).valid);
 }
 
 TEST(Pipeline, ABadPairIsCountedAndTheRunGoesOn) {
