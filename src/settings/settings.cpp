@@ -55,7 +55,8 @@ void load_map(Settings& settings, const YAML::Node& map, const std::string& pref
 void load_file(Settings& settings, const std::filesystem::path& file) {
     std::ifstream stream(file);
     std::stringstream text;
-    if (!std::filesystem::is_regular_file(file) || !stream || !(text << stream.rdbuf()))
+    // An empty file merely fails; what cannot be read is bad.
+    if (!std::filesystem::is_regular_file(file) || !stream || (text << stream.rdbuf()).bad())
         throw Refusal(ExitStatus::kInput, fmt::format("{}: cannot read this configuration file; check the "
                                                       "path and its permissions",
                                                       file.string()));

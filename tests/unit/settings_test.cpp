@@ -207,9 +207,11 @@ TEST_F(SettingsFile, WhatIsNotAConfigurationIsRefused) {
 }
 
 TEST_F(SettingsFile, AnEmptyFileChangesNothing) {
-    Settings settings;
-    load_file(settings, write("# nothing yet\n"));
-    EXPECT_EQ(in_force(settings), in_force(Settings{}));
+    for (const char* text : {"# nothing yet\n", "\n", ""}) {
+        Settings settings;
+        load_file(settings, write(text));
+        EXPECT_EQ(in_force(settings), in_force(Settings{})) << '"' << text << '"';
+    }
 }
 
 TEST_F(SettingsFile, TheSampleUncommentedIsTheDefault) {
