@@ -30,9 +30,14 @@ HealthTracker::HealthTracker(const Counters* counters, std::int64_t stale_after_
 void HealthTracker::note(const FrameResult& result, std::int64_t publish_ns, std::int64_t now_mono_ns) {
     // The result's own time for publishing, if any, is that of the frame before in the same slot.
     constexpr auto kPublish = static_cast<std::size_t>(Stage::kPublish);
-    for (std::size_t stage = 0; stage < stages_.size(); ++stage)
-        if (stage != kPublish && result.times_ns[stage] > 0) stages_[stage].add(result.times_ns[stage]);
+    std::int64_t work_ns = publish_ns;
+    for (std::size_t stage = 0; stage < stages_.size(); ++stage) {
+        if (stage == kPublish || result.times_ns[stage] <= 0) continue;
+        stages_[stage].add(result.times_ns[stage]);
+        if (stage != static_cast<std::size_t>(Stage::kRead)) work_ns += result.times_ns[stage];
+    }
     stages_[kPublish].add(publish_ns);
+    all_stages_.add(work_ns);
     if (is_of_this_clock(result.stamp.source))
         exposure_to_publish_.add(now_mono_ns - result.stamp.exposure_mono_ns);
 
@@ -115,6 +120,7 @@ HealthReport HealthTracker::report(std::int64_t now_utime_us, std::int64_t now_m
     }
     for (std::size_t stage = 0; stage < stages_.size(); ++stage)
         report.stages[stage] = summary_of(stages_[stage]);
+    report.all_stages = summary_of(all_stages_);
     report.exposure_to_publish = summary_of(exposure_to_publish_);
     if (counters_ != nullptr)
         for (std::size_t which = 0; which < report.counts.size(); ++which)

@@ -72,6 +72,7 @@ struct HealthReport {
     double process_rate_hz = kNotMeasured;
     double publish_rate_hz = kNotMeasured;
     std::array<LatencySummary, static_cast<std::size_t>(Stage::kCount)> stages;
+    LatencySummary all_stages;  // of one pair together, without reading it
     LatencySummary exposure_to_publish;
     std::array<std::int64_t, static_cast<std::size_t>(Count::kCount)> counts;  // -1 not counted
     std::int64_t lcm_open_failures = -1;
@@ -130,6 +131,7 @@ class HealthTracker {
     std::uint64_t published_ = 0;  // of the noting thread
     pipeline::TripleBuffer<Note> notes_{{}};
     std::array<LatencyHistogram, static_cast<std::size_t>(Stage::kCount)> stages_;
+    LatencyHistogram all_stages_;
     LatencyHistogram exposure_to_publish_;
     // Of the reporting thread.
     Note last_;

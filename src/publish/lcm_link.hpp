@@ -13,8 +13,8 @@ namespace groundline::publish {
 // LCM's own default, which does not leave the computer (ttl=0).
 std::string resolve_url(const std::string& argument);
 
-// The IPv4 multicast group of a URL whose messages stay on this computer (udpm:// with ttl=0, or without ttl),
-// else empty: what may be routed to the loopback interface.
+// The IPv4 multicast group of a URL whose messages stay on this computer (udpm:// with ttl=0, or without
+// ttl), else empty: what may be routed to the loopback interface.
 std::string loopback_group(const std::string& url);
 
 // Used by one thread; make one link for each thread that sends. Never throws after construction.

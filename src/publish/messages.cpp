@@ -89,7 +89,7 @@ static_assert(10 * kMaxGridCells + 200 <= kMaxMessageBytes);
 static_assert(obstacles_t::MOST == kMaxObstacles);
 static_assert(100 * kMaxObstacles + 100 <= kMaxMessageBytes);
 constexpr std::size_t kHealthCounters = static_cast<std::size_t>(Count::kCount) + 1;
-constexpr std::size_t kHealthLatencies = static_cast<std::size_t>(Stage::kCount) + 1;
+constexpr std::size_t kHealthLatencies = static_cast<std::size_t>(Stage::kCount) + 2;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 // Processors make NaN with different signs: on the wire there is one.
@@ -184,6 +184,7 @@ struct MessageEncoder::Parts {
         health.counters.resize(kHealthCounters);
         for (std::size_t stage = 0; stage < kStageNames.size(); ++stage)
             health.latencies[stage].name = kStageNames[stage];
+        health.latencies[kStageNames.size()].name = "all_stages";
         health.latencies.back().name = "exposure_to_publish";
         for (std::size_t which = 0; which < kCountNames.size(); ++which)
             health.counters[which].name = kCountNames[which];
@@ -453,7 +454,9 @@ MessageEncoder::Bytes MessageEncoder::health(const HealthReport& report) {
     out.publish_rate_hz = wire(report.publish_rate_hz);
     out.latency_count = static_cast<std::int32_t>(kHealthLatencies);
     for (std::size_t i = 0; i < kHealthLatencies; ++i) {
-        const LatencySummary& from = i < report.stages.size() ? report.stages[i] : report.exposure_to_publish;
+        const LatencySummary& from = i < report.stages.size()    ? report.stages[i]
+                                     : i == report.stages.size() ? report.all_stages
+                                                                 : report.exposure_to_publish;
         out.latencies[i].p50_ms = wire(from.p50_ms);
         out.latencies[i].p99_ms = wire(from.p99_ms);
         out.latencies[i].max_ms = wire(from.max_ms);

@@ -111,6 +111,7 @@ TEST(Health, LatenciesPerStage) {
     EXPECT_TRUE(std::isnan(report.stages.at(static_cast<std::size_t>(Stage::kWrite)).p50_ms))
         << "nobody wrote";
     EXPECT_DOUBLE_EQ(report.stages.at(static_cast<std::size_t>(Stage::kPublish)).p50_ms, 6.0);
+    EXPECT_DOUBLE_EQ(report.all_stages.max_ms, 2.0 + 3.0 + 4.0 + 5.0 + 6.0) << "reading is none of them";
     EXPECT_DOUBLE_EQ(report.exposure_to_publish.p99_ms, 50.0);
 }
 

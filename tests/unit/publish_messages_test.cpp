@@ -287,6 +287,7 @@ HealthReport full_report() {
     report.publish_rate_hz = 28.0;
     for (std::size_t i = 0; i < report.stages.size(); ++i)
         report.stages.at(i) = {1.0 + static_cast<double>(i), 2.0, 3.0};
+    report.all_stages = {25.0, 26.0, 27.0};
     report.exposure_to_publish = {50.0, 60.0, 70.0};
     for (std::size_t i = 0; i < report.counts.size(); ++i)
         report.counts.at(i) = static_cast<std::int64_t>(1000 + i);
@@ -303,10 +304,11 @@ TEST(Messages, HealthBytes) {
     MessageEncoder encoder;
     Golden golden;
     golden.fingerprint(0x50beec97c7e42e58).i64(99).i64(98).i8(4).i64(97).i8(1).i32(0x4000).i8(1);
-    golden.reals({0.5, 30.0, 29.0, 28.0}).i32(8);
+    golden.reals({0.5, 30.0, 29.0, 28.0}).i32(9);
     double first = 1.0;
     for (const char* stage : {"read", "rectify", "match", "ground", "classify", "write", "publish"})
         golden.text(stage).reals({first++, 2.0, 3.0});
+    golden.text("all_stages").reals({25.0, 26.0, 27.0});
     golden.text("exposure_to_publish").reals({50.0, 60.0, 70.0}).i32(18);
     std::int64_t count = 1000;
     for (const char* name :
