@@ -51,7 +51,7 @@ constexpr NamedMatcher kMatchers[] = {{"paper", MatcherKind::kPaper, false},
                                       {"census_pyramid", MatcherKind::kCensusPyramid, false}};
 constexpr const char* kSceneNames[] = {"kStepped", "kNoise", "kFine"};
 
-// The output of GROUNDLINE_PRINT_GOLDEN=1 test_stereo --gtest_filter='StereoGolden.*'
+// The output of GROUNDLINE_PRINT_GOLDEN=1 test_golden --gtest_filter='StereoGolden.*'
 constexpr Golden kGolden[] = {
 #include "unit/stereo_golden_hashes.inc"
 };
