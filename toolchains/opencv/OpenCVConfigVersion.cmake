@@ -1,0 +1,11 @@
+# The version of the sysroot's OpenCV, from its header.
+set(PACKAGE_VERSION "")
+set(header "${CMAKE_SYSROOT}/usr/include/opencv4/opencv2/core/version.hpp")
+if(EXISTS "${header}")
+  file(STRINGS "${header}" lines REGEX "^#define CV_VERSION_(MAJOR|MINOR|REVISION) ")
+  list(TRANSFORM lines REPLACE "^.* ([0-9]+) *$" "\\1")
+  list(JOIN lines "." PACKAGE_VERSION)
+endif()
+if(PACKAGE_VERSION VERSION_GREATER_EQUAL PACKAGE_FIND_VERSION)
+  set(PACKAGE_VERSION_COMPATIBLE TRUE)
+endif()
