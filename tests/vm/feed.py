@@ -6,6 +6,7 @@ FOLDER holds PGM files for GREY and YUYV, JPEG files for MJPG; FOLDER+FOLDER put
 the devices are set up.
 """
 import argparse
+import errno
 import fcntl
 import itertools
 import mmap
@@ -19,13 +20,26 @@ OUTPUT, MMAP, NO_FIELDS = 2, 1, 1
 BUFFER = "<5I4xqq16sIIQII4x"  # struct v4l2_buffer of 64-bit Linux
 # As many as the driver was loaded with: the reader and we must agree, or the driver mixes them up.
 BUFFERS = 4
+REFUSED_AT_MOST_S = 10
+
+
+def set_format(file, request):
+    """Repeated while it is refused: a reader that just looks at the device, or lets go of it, holds its format."""
+    end = time.monotonic() + REFUSED_AT_MOST_S
+    while True:
+        try:
+            return fcntl.ioctl(file, S_FMT, bytearray(request))
+        except OSError as refused:
+            if refused.errno not in (errno.EINVAL, errno.EBUSY) or time.monotonic() > end:
+                raise
+        time.sleep(0.05)
 
 
 class Device:
     def __init__(self, path, width, height, code, bytes_a_line, largest):
         self.file = os.open(path, os.O_RDWR)
         picture = struct.pack("<8I", width, height, struct.unpack("<I", code)[0], NO_FIELDS, bytes_a_line, largest, 8, 0)
-        fcntl.ioctl(self.file, S_FMT, bytearray(struct.pack("<I4x", OUTPUT) + picture.ljust(200, b"\0")))
+        set_format(self.file, struct.pack("<I4x", OUTPUT) + picture.ljust(200, b"\0"))
         asked = bytearray(struct.pack("<5I", BUFFERS, OUTPUT, MMAP, 0, 0))
         fcntl.ioctl(self.file, REQBUFS, asked)
         self.maps = []
