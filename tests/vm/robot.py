@@ -21,6 +21,7 @@ from groundline.mask_t import mask_t  # noqa: E402
 PATIENCE_S = 90
 URL = "udpm://239.255.76.67:7667?ttl=0"
 SKIPPED = 77
+FIFO, ORDINARY = os.SCHED_FIFO, os.SCHED_OTHER
 STATES = ("starting", "running", "stalled", "stopping")
 VERDICTS = ("blind", "degraded", "trusted")
 FRAMES = pathlib.Path("/w/frames")  # left/, right/, jpeg/, calib.txt: what frames.cpp rendered
@@ -108,12 +109,40 @@ class Daemon(Program):
         status = self.kill(signal.SIGTERM)
         expect(status == 0, f"the daemon ended with status {status} after SIGTERM")
 
+    def placed(self):
+        """Of each thread: its name, the processors it may run on, its scheduling policy."""
+        threads = []
+        for task in pathlib.Path(f"/proc/{self.process.pid}/task").iterdir():
+            status = dict(line.split(":", 1) for line in (task / "status").read_text().splitlines())
+            policy = os.sched_getscheduler(int(task.name)) & ~os.SCHED_RESET_ON_FORK
+            threads.append((status["Name"].strip(), status["Cpus_allowed_list"].strip(), policy))
+        return threads
+
     def resources(self):
-        """Threads, descriptors, memory taken and memory resident in kB."""
-        status = dict(line.split(":", 1) for line in
-                      pathlib.Path(f"/proc/{self.process.pid}/status").read_text().splitlines())
-        descriptors = len(os.listdir(f"/proc/{self.process.pid}/fd"))
-        return int(status["Threads"]), descriptors, int(status["VmData"].split()[0]), int(status["VmRSS"].split()[0])
+        """Threads, descriptors, memory taken, and how much of the heaps it has touched, in kB.
+
+        Not counted as touched: mappings of a MB and more, which are of a fixed size and made at the start (what frames
+        need, stacks); which of their pages were used so far depends on which slots of the hand-overs were.
+        """
+        process = pathlib.Path(f"/proc/{self.process.pid}")
+
+        def descriptors():
+            time.sleep(0.03)
+            return len(os.listdir(process / "fd"))
+
+        status = dict(line.split(":", 1) for line in (process / "status").read_text().splitlines())
+        touched_kb = size_kb = 0
+        heap = False
+        for key, *values in (line.split() for line in (process / "smaps").read_text().splitlines()):
+            if not key.endswith(":"):
+                heap = values[-1] == "[heap]"
+            elif key == "Size:":
+                size_kb = int(values[0])
+            elif key == "Anonymous:" and (heap or size_kb < 1024):
+                touched_kb += int(values[0])
+        # The supervisor has a file open now and then, for a moment.
+        return (int(status["Threads"]), min(descriptors() for _ in range(10)), int(status["VmData"].split()[0]),
+                touched_kb)
 
 
 class Radio(Program):
