@@ -23,8 +23,8 @@ class RealTime {
     explicit RealTime(const settings::RealtimeSettings& settings);
 
     // On a thread of the pipeline, before its first frame: scheduling, processors, and the first 128 KB of
-    // its stack touched. Writes no log. Threads that a library starts from such a thread (libcamera's, from
-    // the capture thread) are ordinary ones; the processors they inherit.
+    // its stack touched. Writes no log. Threads that a library starts from such a thread are ordinary ones;
+    // the processors they inherit, unless the driver sees to it (libcamera's does).
     void adopt(pipeline::ThreadRole role);
 
     // Once all threads and memory are there. Memory that is never touched stays untouched (MCL_ONFAULT).

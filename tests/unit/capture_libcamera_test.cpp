@@ -2,14 +2,18 @@
 // none.
 #include <gtest/gtest.h>
 
+#include <sched.h>
+
 #include <array>
 #include <filesystem>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "capture/driver_module.hpp"
 #include "capture/libcamera/camera_names.hpp"
 #include "capture/libcamera/monotonic_stamp.hpp"
+#include "capture/libcamera/processors.hpp"
 #include "core/error.hpp"
 
 namespace groundline::capture {
@@ -44,6 +48,34 @@ TEST(CameraNames, WholePartAndNumberFindOneOfThoseAtHand) {
     const Fault none = find_camera("0", {}, index);
     EXPECT_EQ(none.kind, CameraFault::kAbsent);
     EXPECT_NE(none.sentence.view().find("none"), std::string_view::npos);
+}
+
+// As the capture thread is bound to one processor after the driver was made.
+TEST(ProcessorsOfALibrary, AreTheProgramsAndTheCallersAreItsOwnAgain) {
+    const auto here = [] {
+        cpu_set_t set{};
+        EXPECT_EQ(sched_getaffinity(0, sizeof set, &set), 0);
+        return set;
+    };
+    const auto same = [](const cpu_set_t& a, const cpu_set_t& b) { return CPU_EQUAL(&a, &b) != 0; };
+    const cpu_set_t all = here();
+    if (CPU_COUNT(&all) < 2) GTEST_SKIP() << "there is one processor";
+    const Processors processors;
+    std::thread capture([&] {
+        cpu_set_t one{};
+        for (std::size_t cpu = 0; cpu < CPU_SETSIZE && CPU_COUNT(&one) == 0; ++cpu)
+            if (CPU_ISSET(cpu, &all)) CPU_SET(cpu, &one);
+        ASSERT_EQ(sched_setaffinity(0, sizeof one, &one), 0);
+        {
+            const LentProcessors lent(processors);
+            std::thread library([&] { EXPECT_TRUE(same(here(), all)); });
+            library.join();
+        }
+        EXPECT_TRUE(same(here(), one));
+        std::thread ours([&] { EXPECT_TRUE(same(here(), one)); });
+        ours.join();
+    });
+    capture.join();
 }
 
 TEST(MonotonicStamp, IsShiftedOnlyWhereItFitsTheClockThatCountsSleep) {

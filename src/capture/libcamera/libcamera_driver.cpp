@@ -412,6 +412,7 @@ LibcameraDriver::Camera& LibcameraDriver::camera_of(Eye eye) const {
 }
 
 Fault LibcameraDriver::open() {
+    const LentProcessors lent(processors_);
     Fault fault = open_cameras();
     if (!fault.ok()) close();
     return fault;
@@ -452,6 +453,7 @@ Fault LibcameraDriver::open_cameras() {
 }
 
 Fault LibcameraDriver::start() {
+    const LentProcessors lent(processors_);
     for (const auto& camera : cameras_)
         if (Fault fault = camera->start(setup_); !fault.ok()) return fault;
     return {};

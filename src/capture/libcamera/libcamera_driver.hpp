@@ -7,12 +7,14 @@
 
 #include "capture/camera_driver.hpp"
 #include "capture/camera_setup.hpp"
+#include "capture/libcamera/processors.hpp"
 
 namespace groundline::capture {
 
 // See camera_driver.hpp; cameras are named as in camera_names.hpp. Pictures come on libcamera's own thread
 // and cross to the caller's without a lock. Formats: R8, NV12, YUV420, YUYV, UYVY, BGR888, RGB888. Requests
-// are used again and again; libcamera itself takes memory for the controls and metadata of each.
+// are used again and again; libcamera itself takes memory for the controls and metadata of each. Its threads
+// run where the thread that made this object may run, whatever the one that opens the cameras is bound to.
 class LibcameraDriver final : public CameraDriver {
   public:
     explicit LibcameraDriver(CameraSetup setup);
@@ -38,6 +40,7 @@ class LibcameraDriver final : public CameraDriver {
     Fault open_cameras();
 
     CameraSetup setup_;
+    Processors processors_;
     std::unique_ptr<Manager> manager_;
     std::vector<std::unique_ptr<Camera>> cameras_;
     std::size_t next_camera_ = 0;
