@@ -43,7 +43,8 @@ settings::Settings read_settings(const DaemonOptions& options) {
 }
 
 // Results and health go out on two connections, which two programs' worth of LCM understands but a file or
-// memory does not.
+// memory does not. LCM's TCP waits without limit for a server that accepts and does not answer, and a thread
+// that waits there would be taken for one that is stuck.
 publish::LcmOptions lcm_options(const settings::Settings& settings, Counters& counters,
                                 publish::HealthTracker* tracker = nullptr) {
     publish::LcmOptions options = setup::lcm_options(settings, counters);
@@ -52,6 +53,11 @@ publish::LcmOptions lcm_options(const settings::Settings& settings, Counters& co
         throw Refusal(ExitStatus::kConfig,
                       fmt::format("publish.url: '{}' cannot be shared by the two connections "
                                   "of this program; use udpm://, and lcm-logger for files",
+                                  url));
+    if (url.starts_with("tcpq:"))
+        throw Refusal(ExitStatus::kConfig,
+                      fmt::format("publish.url: '{}' would hold this program up for as long as its server "
+                                  "does not answer; use udpm://, which waits for nobody",
                                   url));
     options.channels.health = false;  // sent by the supervisor
     options.tracker = tracker;

@@ -541,3 +541,4 @@ TEST(DaemonRefuses, WithTheDocumentedStatusAndOneSentence) {
 
 }  // namespace
 }  // namespace groundline::test
+        {"LCM by TCP", {"--config", good, "--set", "publish.url=tcpq://localhost:7700"}, 78, {"use udpm://"}},
