@@ -13,6 +13,7 @@
 #include "core/clock.hpp"
 #include "daemon/log.hpp"
 #include "daemon/status.hpp"
+#include "daemon/threads.hpp"
 
 namespace groundline::daemon {
 namespace {
@@ -142,6 +143,7 @@ void Supervisor::watch(std::int64_t now_mono_ns) {
     progress.delivered = counters.get(Count::kResultsDelivered);
     progress.health_beats = health_beats_.load();
     progress.in_device_call = watched_.cameras != nullptr && watched_.cameras->in_device_call();
+    progress.thread_stopped = a_thread_is_stopped();
     const verdict::Liveness look =
         verdict::judge_liveness(progress, liveness_, now_mono_ns, limit_ns > 0 ? limit_ns / 2 : kStillNs);
     liveness_ = look.state;

@@ -13,9 +13,12 @@ Liveness judge_liveness(const Progress& progress, const LivenessState& state, st
     // Coming back from a device is a move, though the loop has not turned yet.
     const bool captures =
         progress.capture_turns != seen.capture_turns || progress.in_device_call != seen.in_device_call;
-    const std::array<bool, 5> good = {true, captures, progress.processed != seen.processed || !for_processing,
+    const std::array<bool, 6> good = {true,
+                                      captures,
+                                      progress.processed != seen.processed || !for_processing,
                                       progress.delivered != seen.delivered || !for_sinks,
-                                      progress.health_beats != seen.health_beats};
+                                      progress.health_beats != seen.health_beats,
+                                      !progress.thread_stopped};
     Liveness result;
     result.state = {true, progress, state.good_mono_ns};
     for (std::size_t part = 0; part < good.size(); ++part) {

@@ -17,21 +17,22 @@ struct Progress {
     std::uint64_t delivered = 0;      // of those, through all sinks
     std::uint64_t health_beats = 0;   // rounds of the thread that sends health
     bool in_device_call = false;      // capture is inside a call that opens, starts or closes devices
+    bool thread_stopped = false;      // the kernel shows some thread of the process as stopped
 };
 
 // A kernel may take this long over such a call: a bus that has to time out three times over at 5 to 10 s
 // each.
 inline constexpr std::int64_t kLongestDeviceCallNs = 30'000'000'000;
 
-enum class Stuck : std::uint8_t { kNone, kCapture, kProcessing, kSinks, kHealth };
-inline constexpr std::array<std::string_view, 5> kStuckNames = {"", "capture", "processing", "sinks",
-                                                                "health"};
+enum class Stuck : std::uint8_t { kNone, kCapture, kProcessing, kSinks, kHealth, kOther };
+inline constexpr std::array<std::string_view, 6> kStuckNames = {
+    "", "capture", "processing", "sinks", "health", "the log, attitudes or a library"};
 
 // What is remembered between two looks: when each part last moved or had nothing to do.
 struct LivenessState {
     bool started = false;
     Progress seen;
-    std::array<std::int64_t, 5> good_mono_ns{};  // by Stuck
+    std::array<std::int64_t, 6> good_mono_ns{};  // by Stuck
 };
 
 struct Liveness {
@@ -42,8 +43,9 @@ struct Liveness {
 
 // Capture and health must always move. Processing and sinks must move while something waits for them; without
 // pairs (a camera is absent, and the capture loop turns) they are in order as they stand. Inside a device
-// call capture has kLongestDeviceCallNs, if that is longer. A look that comes late finds what moved in
-// between.
+// call capture has kLongestDeviceCallNs, if that is longer. Of the other threads (the log's, attitudes',
+// libraries') there is no count of what they do; they may wait for as long as they like, but not be stopped.
+// A look that comes late finds what moved in between.
 Liveness judge_liveness(const Progress& progress, const LivenessState& state, std::int64_t now_mono_ns,
                         std::int64_t limit_ns);
 

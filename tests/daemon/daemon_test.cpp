@@ -8,9 +8,12 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <csignal>
 #include <fstream>
+#include <map>
 #include <regex>
+#include <thread>
 
 #include "daemon/service.hpp"
 #include "groundline/attitude_t.hpp"
@@ -194,27 +197,50 @@ TEST_F(Daemon, WithoutAWatchdogNobodyFeedsOne) {
     EXPECT_EQ(service.told("WATCHDOG"), 0);
 }
 
-// Each thread, stopped as a debugger stops it.
-TEST_F(Daemon, AThreadThatStandsStillIsNamedAndTheWatchdogStarves) {
-    const std::vector<std::pair<std::string, std::string>> threads = {{"gl-capture", "capture"},
-                                                                      {"gl-process", "processing"},
-                                                                      {"gl-sinks", "sinks"},
-                                                                      {"gl-worker1", "processing"},
-                                                                      {"gl-health", "health"}};
-    for (const auto& [thread, part] : threads) {
-        Start with = start({"--set", "process.threads=2"});
-        with.watchdog_us = 4'000'000;
+// Each thread there is, libraries' too, stopped as a debugger stops it.
+TEST_F(Daemon, AnyThreadThatStandsStillStarvesTheWatchdog) {
+    const std::map<std::string, std::string> parts = {{"gl-capture", "capture"},
+                                                      {"gl-process", "processing"},
+                                                      {"gl-worker1", "processing"},
+                                                      {"gl-sinks", "sinks"},
+                                                      {"gl-health", "health"}};
+    const std::string other = "the log, attitudes or a library";
+    constexpr std::chrono::seconds kLimit(4);
+    std::size_t count = 1;
+    for (std::size_t number = 0; number < count; ++number) {
+        Start with = start({"--set", "process.threads=2", "--set", "attitude.input=on"});
+        with.watchdog_us = std::chrono::microseconds(kLimit).count();
         Service service(with);
         ASSERT_TRUE(eventually([&] { return service.says("pairs come"); })) << service.said();
+        ASSERT_TRUE(eventually([&] { return service.threads().size() >= 9; }))  // LCM's own is the last
+            << service.threads().size();
+        const std::vector<Service::Thread> threads = service.threads();
+        count = threads.size();
+        ASSERT_LT(number, count);
+        const Service::Thread& thread = threads[number];
+        const bool supervisor = thread.id == service.pid();  // which then can say and feed nothing
+        const auto known = parts.find(thread.name);
+        const std::string named = "the thread for " + (known == parts.end() ? other : known->second);
+        SCOPED_TRACE(thread.name);
         {
-            const Service::Stopped stopped(service, thread);
+            const Service::Stopped stopped(thread.id);
             if (!stopped.stopped()) GTEST_SKIP() << "threads of other programs may not be stopped here";
-            ASSERT_TRUE(eventually([&] { return service.told("WATCHDOG=trigger") > 0; }))
-                << thread << service.said();
-            EXPECT_TRUE(service.says("the thread for " + part)) << thread << ": " << service.said();
-            EXPECT_EQ(service.told().back().find("WATCHDOG=1"), std::string::npos) << "fed after that";
+            if (supervisor) {
+                const std::size_t told = service.told().size();
+                std::this_thread::sleep_for(kLimit);
+                EXPECT_EQ(service.told().size(), told);
+            } else {
+                ASSERT_TRUE(eventually([&] { return service.told("WATCHDOG=trigger") > 0; }))
+                    << service.said();
+                EXPECT_EQ(service.told().back().find("WATCHDOG=1"), std::string::npos) << "fed after that";
+                EXPECT_TRUE(thread.name == "gl-log" || service.says(named)) << service.said();
+            }
         }
+        const int fed = service.told("WATCHDOG=1");
+        EXPECT_TRUE(eventually([&] { return service.told("WATCHDOG=1") > fed; })) << service.said();
+        if (supervisor) continue;
         EXPECT_TRUE(eventually([&] { return service.says("every thread moves again"); })) << service.said();
+        EXPECT_TRUE(service.says(named)) << service.said();
         EXPECT_EQ(service.told("WATCHDOG=trigger"), 1);
     }
 }
@@ -231,6 +257,20 @@ TEST_F(Daemon, TakesAttitudesWhereItIsToldTo) {
     attitude_t attitude{};  // of 1970
     ASSERT_TRUE(robot.until([&] { return robot.send("GROUNDLINE_ATTITUDE", attitude) && refused() > 0; }))
         << service.said();
+    int status = -1;
+    service.end_ms(SIGTERM, status);
+    EXPECT_EQ(status, 0);
+}
+
+// The log's thread then waits for ever, which is in order.
+TEST_F(Daemon, AJournalThatHangsStarvesNoWatchdogAndHoldsUpNoEnd) {
+    Start with = start();
+    with.watchdog_us = 1'000'000;
+    with.deaf = true;
+    Service service(with);
+    ASSERT_TRUE(ready(service));
+    EXPECT_TRUE(eventually([&] { return service.told("WATCHDOG=1") >= 5; }));
+    EXPECT_EQ(service.told("WATCHDOG=trigger"), 0);
     int status = -1;
     service.end_ms(SIGTERM, status);
     EXPECT_EQ(status, 0);
@@ -519,6 +559,7 @@ TEST(DaemonRefuses, WithTheDocumentedStatusAndOneSentence) {
         {"half a mount", {"--config", good, "--set", "mount.height_m=1"}, 78, {"mount.pitch_deg"}},
         {"URL", {"--config", good, "--set", "publish.url=nonsense"}, 78, {"udpm://ADDRESS:PORT"}},
         {"log file", {"--config", good, "--set", "publish.url=file://x.lcm?mode=w"}, 78, {"lcm-logger"}},
+        {"LCM by TCP", {"--config", good, "--set", "publish.url=tcpq://localhost:7700"}, 78, {"use udpm://"}},
         {"misuse", {"--frames", "3"}, 2, {"--help"}},
     };
     for (const Refused& each : cases)
@@ -541,4 +582,3 @@ TEST(DaemonRefuses, WithTheDocumentedStatusAndOneSentence) {
 
 }  // namespace
 }  // namespace groundline::test
-        {"LCM by TCP", {"--config", good, "--set", "publish.url=tcpq://localhost:7700"}, 78, {"use udpm://"}},

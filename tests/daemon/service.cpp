@@ -1,5 +1,6 @@
 #include "daemon/service.hpp"
 
+#include <fcntl.h>
 #include <linux/capability.h>
 #include <poll.h>
 #include <sched.h>
@@ -12,6 +13,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <csignal>
@@ -58,6 +60,13 @@ Service::Service(const Start& start) {
     struct stat stream {};
     fstat(err[1], &stream);
     const std::string journal = std::to_string(stream.st_dev) + ":" + std::to_string(stream.st_ino);
+    if (start.deaf) {
+        const std::array<char, 4096> page{};
+        fcntl(err[1], F_SETFL, O_NONBLOCK);
+        while (write(err[1], page.data(), page.size()) > 0) {
+        }
+        fcntl(err[1], F_SETFL, 0);
+    }
     pid_ = fork();
     if (pid_ == 0) {
         setenv("NOTIFY_SOCKET", address.c_str(), 1);
@@ -81,11 +90,13 @@ Service::Service(const Start& start) {
         _exit(127);
     }
     close(err[1]);
-    listener_ = std::jthread([this, notify, end = err[0]] { listen(notify, end); });
+    listener_ = std::jthread([this, notify, end = err[0], deaf = start.deaf] { listen(notify, end, deaf); });
 }
 
-void Service::listen(int notify, int err) {
-    std::array<pollfd, 2> open{{{err, POLLIN, 0}, {notify, POLLIN, 0}}};
+void Service::listen(int notify, int err, bool deaf) {
+    // The end of the program is heard in either case.
+    const short wanted = deaf ? 0 : POLLIN;
+    std::array<pollfd, 2> open{{{err, wanted, 0}, {notify, POLLIN, 0}}};
     while (open[0].fd >= 0) {
         if (poll(open.data(), open.size(), -1) < 0) continue;
         std::array<char, 4096> buffer{};
@@ -150,17 +161,30 @@ std::string Service::said() {
     return said_;
 }
 
-Service::Stopped::Stopped(const Service& service, const std::string& thread) {
-    const std::filesystem::path tasks = "/proc/" + std::to_string(service.pid()) + "/task";
+std::vector<Service::Thread> Service::threads() const {
+    std::vector<Thread> found;
+    const std::filesystem::path tasks = "/proc/" + std::to_string(pid_) + "/task";
     for (const auto& task : std::filesystem::directory_iterator(tasks)) {
         std::ifstream comm(task.path() / "comm");
         std::string name;
-        if (std::getline(comm, name) && name == thread) thread_ = std::stoi(task.path().filename());
+        if (std::getline(comm, name)) found.push_back({std::stoi(task.path().filename()), name});
     }
-    if (thread_ == 0 || ptrace(PTRACE_SEIZE, thread_, nullptr, nullptr) != 0) return;
+    std::sort(found.begin(), found.end(), [](const Thread& a, const Thread& b) { return a.id < b.id; });
+    return found;
+}
+
+Service::Stopped::Stopped(pid_t thread) : thread_(thread) {
+    if (ptrace(PTRACE_SEIZE, thread_, nullptr, nullptr) != 0) return;
     ptrace(PTRACE_INTERRUPT, thread_, nullptr, nullptr);
     stopped_ = waitpid(thread_, nullptr, __WALL) == thread_;
 }
+
+Service::Stopped::Stopped(const Service& service, const std::string& thread)
+    : Stopped([&] {
+          for (const Thread& each : service.threads())
+              if (each.name == thread) return each.id;
+          throw std::runtime_error("no thread is named " + thread);
+      }()) {}
 
 Service::Stopped::~Stopped() {
     if (stopped_) ptrace(PTRACE_DETACH, thread_, nullptr, nullptr);

@@ -29,6 +29,7 @@ struct Start {
     bool journal = false;  // stderr says that it is the journal's
     std::string url = {};  // LCM_DEFAULT_URL
     std::vector<std::pair<std::string, std::string>> environment = {};
+    bool deaf = false;          // nobody reads stderr, and its pipe is full
     bool unprivileged = false;  // without the right to real time and to lock memory
 };
 
@@ -47,6 +48,12 @@ class Service {
     // Milliseconds from the signal to the end.
     double end_ms(int number, int& status);
 
+    struct Thread {
+        pid_t id;
+        std::string name;
+    };
+    // Its threads now, in the order in which they were started.
+    std::vector<Thread> threads() const;
     // What came over NOTIFY_SOCKET so far, one datagram each.
     std::vector<std::string> told();
     // How many of those contain `text`.
@@ -55,9 +62,10 @@ class Service {
     std::string said();
     bool says(const std::string& text) { return said().find(text) != std::string::npos; }
 
-    // The thread with that name, stopped as a debugger does until the object ends.
+    // A thread, stopped as a debugger does until the object ends.
     class Stopped {
       public:
+        explicit Stopped(pid_t thread);
         Stopped(const Service& service, const std::string& thread);
         ~Stopped();
         Stopped(const Stopped&) = delete;
@@ -70,7 +78,7 @@ class Service {
     };
 
   private:
-    void listen(int notify, int err);
+    void listen(int notify, int err, bool deaf);
 
     Folder folder_;
     pid_t pid_ = -1;

@@ -1,20 +1,28 @@
 // Parts of the daemon by themselves: the sentence of its status, the computer's sensors, the manager's
 // socket.
 #include <gtest/gtest.h>
+#include <sys/prctl.h>
+#include <sys/ptrace.h>
 #include <sys/socket.h>
 #include <sys/un.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <array>
+#include <atomic>
+#include <chrono>
 #include <cmath>
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <thread>
 
 #include "daemon/host_health.hpp"
 #include "daemon/log.hpp"
 #include "daemon/service_manager.hpp"
 #include "daemon/status.hpp"
+#include "daemon/threads.hpp"
 
 namespace groundline::daemon {
 namespace {
@@ -55,6 +63,8 @@ TEST(Status, IsOneSentence) {
     EXPECT_EQ(status_of(report(LifeState::kRunning, Verdict::kDegraded,
                                {Reason::kNoMountPrior, Reason::kDark, Reason::kOverload})),
               "running: 29.8 pairs/s, degraded (dark, overload)");
+    EXPECT_EQ(status_of(report(LifeState::kRunning, Verdict::kTrusted, {Reason::kOverload})),
+              "running: 29.8 pairs/s, trusted");
     HealthReport first = report(LifeState::kRunning, Verdict::kTrusted, {});
     first.publish_rate_hz = publish::kNotMeasured;
     EXPECT_EQ(status_of(first), "running: trusted");
@@ -203,6 +213,59 @@ TEST(Log, CountsTheLinesThatNobodyTook) {
     close_log();
     EXPECT_GT(lost, 0U);
     EXPECT_LT(lost, 2000U);
+}
+
+// Stopped by another process for as long as it lives.
+TEST(Threads, OnlyOneThatIsStoppedCounts) {
+    std::array<int, 2> ends{};
+    ASSERT_EQ(pipe(ends.data()), 0);
+    std::atomic<pid_t> waiting{0};
+    std::jthread waits([&] {
+        waiting = gettid();
+        char byte = 0;
+        EXPECT_EQ(read(ends[0], &byte, 1), 1);
+    });
+    while (waiting == 0)
+        std::this_thread::yield();
+    EXPECT_FALSE(a_thread_is_stopped());
+    std::array<int, 2> said{};
+    ASSERT_EQ(pipe(said.data()), 0);
+    const pid_t debugger = fork();
+    if (debugger == 0) {
+        char may = 0;
+        if (read(said[0], &may, 1) != 1) _exit(1);
+        const bool stopped = ptrace(PTRACE_SEIZE, waiting.load(), nullptr, nullptr) == 0 &&
+                             ptrace(PTRACE_INTERRUPT, waiting.load(), nullptr, nullptr) == 0 &&
+                             waitpid(waiting, nullptr, __WALL) == waiting;
+        if (stopped) pause();
+        _exit(1);
+    }
+    prctl(PR_SET_PTRACER, debugger);
+    ASSERT_EQ(write(said[1], "1", 1), 1);
+    const auto wait = [](const auto& so) {
+        const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+        while (!so() && std::chrono::steady_clock::now() < end)
+            std::this_thread::yield();
+    };
+    bool stopped = false;
+    bool refused = false;
+    wait([&] {
+        stopped = a_thread_is_stopped();
+        refused = waitpid(debugger, nullptr, WNOHANG) != 0;
+        return stopped || refused;
+    });
+    if (!refused) {
+        EXPECT_TRUE(stopped);
+        kill(debugger, SIGKILL);
+        waitpid(debugger, nullptr, 0);
+    }
+    wait([] { return !a_thread_is_stopped(); });
+    EXPECT_FALSE(a_thread_is_stopped());
+    EXPECT_EQ(write(ends[1], "1", 1), 1);
+    waits.join();
+    for (const int end : {ends[0], ends[1], said[0], said[1]})
+        close(end);
+    if (refused) GTEST_SKIP() << "a child may not stop a thread of this process here";
 }
 
 TEST(ServiceManager, AnotherProcessesWatchdogIsNotOurs) {

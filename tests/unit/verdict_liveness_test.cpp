@@ -59,6 +59,12 @@ const std::vector<Case>& cases() {
          },
          Stuck::kSinks},
         {"health stopped", [](Progress& p) { run_well(p), --p.health_beats; }, Stuck::kHealth},
+        {"the log's thread, or a library's, stopped",
+         [](Progress& p) { run_well(p), p.thread_stopped = true; }, Stuck::kOther},
+        {"another one is caught at every look",
+         [](Progress& p) { run_well(p), p.thread_stopped = !p.thread_stopped; }, Stuck::kNone},
+        {"a thread that counts stopped",
+         [](Progress& p) { run_well(p), --p.health_beats, p.thread_stopped = true; }, Stuck::kHealth},
         {"everything stopped", [](Progress&) {}, Stuck::kCapture},
     };
     return table;
@@ -87,6 +93,7 @@ TEST(Liveness, EachStoppedThreadIsNamedOnceTheLimitIsReached) {
         run_well(progress);
         progress.capture_lost = progress.captured - progress.processed;
         progress.results_lost = progress.processed - progress.delivered;
+        progress.thread_stopped = false;
         EXPECT_EQ(judge_liveness(progress, state, now, kLimit).stuck, Stuck::kNone)
             << each.what << ", moving again";
     }
