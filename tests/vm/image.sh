@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Makes the virtual robot's disk: a Debian with systemd, udev, V4L2, libcamera and LCM tools and three camera drivers
-# that need no camera (vivid, v4l2loopback, vimc), and the kernel to boot it.
+# that need no camera (vivid, v4l2loopback, vimc), an ssh server, and the kernel to boot it.
 #   tests/vm/image.sh FOLDER [PACKAGE...]     packages: what the programs under test need besides
 # FOLDER gets vmlinux, initrd.cpio and root.ext4, and last of all `made`, with the versions inside. Packages are kept
 # in FOLDER/../debs for the next time. They come from the archives that this machine's apt uses, their versions are
@@ -13,8 +13,8 @@ debs=$(cd "$1/../debs" && pwd)
 shift
 
 inside=(systemd systemd-sysv udev kmod iproute2 procps v4l-utils libcamera-tools libcamera-ipa liblcm-bin
-    python3-minimal libpython3-stdlib "$@")
-drivers=(virtio_console 9p 9pnet_virtio vivid v4l2-tpg videobuf2-vmalloc videobuf2-dma-contig)
+    python3-minimal libpython3-stdlib openssh-server "$@")
+drivers=(virtio_net virtio_console 9p 9pnet_virtio vivid v4l2-tpg videobuf2-vmalloc videobuf2-dma-contig)
 boot_drivers=(virtio_pci virtio_blk ext4 crc32c_generic)
 
 work=$(mktemp -d "${TMPDIR:-/var/tmp}/groundline-vm.XXXXXX")
@@ -135,7 +135,7 @@ sha256sum <<<"groundline" | cut -c 1-32 >"$root/etc/machine-id"
 chroot "$root" systemctl --quiet enable robot.service
 # What a robot without a network, terminals and disks to look after does not wait for.
 chroot "$root" systemctl --quiet mask getty.target systemd-networkd.service systemd-logind.service \
-    systemd-timesyncd.service systemd-pstore.service systemd-random-seed.service systemd-update-utmp.service systemd-update-utmp-runlevel.service \
+    ssh.service systemd-timesyncd.service systemd-pstore.service systemd-random-seed.service systemd-update-utmp.service systemd-update-utmp-runlevel.service \
     apt-daily.timer apt-daily-upgrade.timer dpkg-db-backup.timer fstrim.timer e2scrub_all.timer \
     e2scrub_reap.service systemd-tmpfiles-clean.timer
 

@@ -36,7 +36,7 @@ class Machine:
         self.disk = self.image / f"state-{state}.qcow2"
 
     @contextlib.contextmanager
-    def _started(self, folder, disk, shared, out, extra):
+    def _started(self, folder, disk, shared, out, extra, network=""):
         """qemu with its sockets and console in `folder`; killed at the end."""
         command = ["qemu-system-x86_64", *self.settings,
                    "-drive", f"{disk},if=virtio,cache=unsafe",
@@ -44,6 +44,8 @@ class Machine:
                    "-qmp", f"unix:{folder}/qmp,server=on,wait=off",
                    "-chardev", f"socket,id=port,path={folder}/port,server=on,wait=off",
                    "-device", "virtserialport,chardev=port,name=robot",
+                   # A network that reaches nothing; nor does the machine know of it until a case sets it up.
+                   "-netdev", f"user,id=net,restrict=on{network}", "-device", "virtio-net-pci,netdev=net,romfile=",
                    "-virtfs", f"local,path={shared},mount_tag=w,security_model=none,readonly=on,multidevs=remap",
                    "-virtfs", f"local,path={out},mount_tag=out,security_model=none,multidevs=remap", *extra]
         with open(f"{folder}/qemu", "w", encoding="utf-8") as said:
@@ -84,11 +86,7 @@ class Machine:
             subprocess.run(["qemu-img", "create", "-q", "-f", "qcow2", "-F", "raw", "-b",
                             str(self.image / "root.ext4"), str(self.disk)], check=True)
             with self._started(folder, f"file={self.disk},format=qcow2", folder, folder, []) as process:
-                console = pathlib.Path(folder, "console")
-                while "robot: ready" not in (console.read_text(errors="replace") if console.exists() else ""):
-                    if process.poll() is not None or time.monotonic() > limit:
-                        raise Broken(f"it does not start: {self._why(folder)}")
-                    time.sleep(0.2)
+                self._wait_ready(folder, process, limit)
                 with self._connected(f"{folder}/qmp", process, limit) as link, link.makefile("rw") as qmp:
                     def ask(execute, **arguments):
                         qmp.write(json.dumps({"execute": execute, "arguments": arguments}) + "\n")
@@ -108,9 +106,19 @@ class Machine:
         part.rename(self.state)
         return time.monotonic() - begin
 
-    def run(self, command, shared, out, limit_s, hear=lambda line: None):
+    @staticmethod
+    def _wait_ready(folder, process, limit):
+        console = pathlib.Path(folder, "console")
+        while "robot: ready" not in (console.read_text(errors="replace") if console.exists() else ""):
+            if process.poll() is not None or time.monotonic() > limit:
+                raise Broken(f"it does not start: {Machine._why(folder)}")
+            time.sleep(0.2)
+
+    def run(self, command, shared, out, limit_s, hear=lambda line: None, ssh_port=None):
         """Runs `command` in /w, which is `shared` (read-only), with `out` as /out; every line goes to hear().
 
+        The line "robot: again" says that the machine starts anew now; then `command` is run once more. `ssh_port` of
+        this computer leads to the machine's, once it has set its network up (10.0.2.15).
         Exit status, or None where limit_s ran out. Raises Broken.
         """
         shutil.rmtree(out, ignore_errors=True)
@@ -118,10 +126,14 @@ class Machine:
         limit = time.monotonic() + limit_s
         with tempfile.TemporaryDirectory(prefix="groundline-vm.") as folder:
             disk = f"file={self.disk},format=qcow2,snapshot=on"
-            state = ["-incoming", f"exec:cat '{self.state}'"]
-            with self._started(folder, disk, shared, out, state) as process, \
+            state = ["-incoming", f"exec:cat '{self.state}'", "-action", "reboot=reset"]
+            network = f",hostfwd=tcp:127.0.0.1:{ssh_port}-10.0.2.15:22" if ssh_port else ""
+            with self._started(folder, disk, shared, out, state, network) as process, \
                     self._connected(f"{folder}/port", process, limit) as link:
-                link.sendall(f"{time.time():.3f} {command}\n".encode())
+                def start():
+                    link.sendall(f"{time.time():.3f} {command}\n".encode())
+
+                start()
                 rest = b""
                 while (left_s := limit - time.monotonic()) > 0:
                     link.settimeout(left_s)
@@ -136,5 +148,8 @@ class Machine:
                         text = line.decode(errors="replace").rstrip("\r")
                         if text.startswith("robot: exit "):
                             return int(text.split()[-1])
+                        if text == "robot: again":
+                            self._wait_ready(folder, process, limit)
+                            start()
                         hear(text)
                 return None

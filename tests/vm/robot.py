@@ -148,9 +148,10 @@ class Daemon(Program):
 class Radio(Program):
     """Everything said on LCM since it was made: lcm-logger records, this reads along."""
 
-    def __init__(self, stack):
-        command("ip", "route", "replace", "224.0.0.0/4", "dev", "lo")
-        command("sysctl", "-qw", "net.core.rmem_max=16000000", "net.core.rmem_default=16000000")
+    def __init__(self, stack, prepare=True):
+        if prepare:
+            command("ip", "route", "replace", "224.0.0.0/4", "dev", "lo")
+            command("sysctl", "-qw", "net.core.rmem_max=16000000", "net.core.rmem_default=16000000")
         self.file = pathlib.Path("/tmp/lcm.log")
         self.file.unlink(missing_ok=True)
         super().__init__(stack, "lcm-logger", "lcm-logger", "-q", "--flush-interval=50", f"--lcm-url={URL}", self.file)

@@ -1,17 +1,19 @@
 #!/usr/bin/env python3
 """Runs the cases of tests/vm/cases in the virtual robot, each in a machine of its own; see ./dev vm.
 
-run.py --folder FOLDER --build BUILD [CASE...]
+run.py --folder FOLDER --build BUILD [--at-once N] [CASE...]
 One line a case; exit status 1 if any failed. FOLDER keeps the machine's image, as long as what it is made from does not
 change, and what each case said and wrote.
 """
 import argparse
+import concurrent.futures
 import hashlib
 import os
 import pathlib
 import platform
 import re
 import shutil
+import socket
 import subprocess
 import sys
 import time
@@ -20,21 +22,44 @@ import machine
 
 HERE = pathlib.Path(__file__).resolve().parent
 CASES = HERE / "cases"
-CASE_LIMIT_S = 420  # for one that hangs
+CASE_LIMIT_S = 600  # for one that hangs
 SKIPPED = 77
 SCENE = "drive?width=320&height=240&focal=250&boxes=2&seed=7&frames=130"
 FRAMES = 130
 
 
-def runtime_packages(programs):
-    """Debian packages with the libraries that the programs name."""
-    libraries = set()
-    for program in programs:
-        said = subprocess.run(["readelf", "-d", program], capture_output=True, text=True, check=True).stdout
-        libraries.update(re.findall(r"NEEDED.*\[(.*)\]", said))
-    patterns = [f"*/lib/x86_64-linux-gnu/{library}" for library in sorted(libraries)]
-    owners = subprocess.run(["dpkg-query", "-S", *patterns], capture_output=True, text=True, check=False).stdout
-    return sorted({line.split(":")[0] for line in owners.splitlines()})
+def pack(build, folder):
+    """The Debian packages of the build in folder/this, and in folder/next what an upgrade would bring: the same in a
+    later version, with one line more in the configuration file."""
+    shutil.rmtree(folder, ignore_errors=True)
+    packed = subprocess.run(["cpack", "--config", build / "CPackConfig.cmake", "-B", folder / "this"], check=False,
+                            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    if packed.returncode != 0:
+        sys.exit(f"The packages cannot be made: {packed.stdout}")
+    shutil.rmtree(folder / "this/_CPack_Packages")
+    (folder / "next").mkdir()
+    debs = sorted((folder / "this").glob("*.deb"))
+    for deb in debs:
+        tree = folder / "tree"
+        subprocess.run(["dpkg-deb", "-R", deb, tree], check=True)
+        control = tree / "DEBIAN/control"
+        control.write_text(re.sub(r"(Version: |groundline \(= )(\S+?-)\d+", r"\g<1>\g<2>99", control.read_text()))
+        if (config := tree / "etc/groundline/groundline.yaml").exists():
+            config.write_text(config.read_text() + "# A line of the next version.\n")
+        subprocess.run(["dpkg-deb", "--root-owner-group", "-Znone", "-b", tree, folder / "next" / deb.name], check=True,
+                       stdout=subprocess.DEVNULL)
+        shutil.rmtree(tree)
+    return debs
+
+
+def needed_packages(debs):
+    """What the packages depend on, apart from each other and from what they are only built with."""
+    names = set()
+    for deb in debs:
+        if not deb.name.startswith("groundline-dev_"):
+            said = subprocess.run(["dpkg-deb", "-f", deb, "Depends"], capture_output=True, text=True, check=True).stdout
+            names.update(wanted.split()[0] for wanted in said.split(","))
+    return sorted(names - {"groundline"})
 
 
 def make_image(folder, packages):
@@ -54,7 +79,8 @@ def make_image(folder, packages):
 
 
 def make_shared(shared, programs, frames):
-    """What the machine sees as /w: the programs, the cases, message types for Python, rendered frames."""
+    """What the machine sees as /w beside the packages: the programs, the cases, message types for Python, rendered
+    frames."""
     shutil.rmtree(shared / "bin", ignore_errors=True)
     (shared / "bin").mkdir(parents=True, exist_ok=True)
     for program in programs:
@@ -74,17 +100,45 @@ def make_shared(shared, programs, frames):
                    check=True)
 
 
+class Deployment:
+    """What the case package_deploy asks the computer outside for."""
+
+    def __init__(self, shared, out):
+        self.packages, self.out, self.count = shared / "debs/this", out, 0
+        with socket.create_server(("127.0.0.1", 0)) as free:
+            self.port = free.getsockname()[1]
+
+    def offer_key(self):
+        subprocess.run(["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", self.out / "key"], check=True)
+
+    def deploy(self):
+        self.count += 1
+        ssh = (f"ssh -p {self.port} -i {self.out}/key -o StrictHostKeyChecking=no -o UserKnownHostsFile=/dev/null "
+               "-o LogLevel=ERROR -o BatchMode=yes")
+        done = subprocess.run([HERE / "../../dev", "deploy", "root@127.0.0.1"], check=False, text=True,
+                              env={**os.environ, "GROUNDLINE_SSH": ssh, "GROUNDLINE_PACKAGES": str(self.packages)},
+                              stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+        told = self.out / f"deploy-{self.count}"
+        told.with_suffix(".part").write_text(f"{done.stdout}\n{done.returncode}")
+        told.with_suffix(".part").rename(told)
+
+
 def run_case(robot, name, shared, out):
     """Status and the case's last line."""
     said = []
+    outside = Deployment(shared, out / name)
     with open(out / f"{name}.log", "w", encoding="utf-8") as log:
         def hear(line):
             said.append(line)
             print(line, file=log, flush=True)
+            if line == "robot: key":
+                outside.offer_key()
+            if line == "robot: deploy":
+                outside.deploy()
 
         try:
             status = robot.run(f"PYTHONPATH=/w/vm python3 -u /w/vm/cases/{name}.py", shared, out / name, CASE_LIMIT_S,
-                               hear)
+                               hear, outside.port)
         except machine.Broken as broken:
             return 1, f"the machine: {broken}"
     last = next((line for line in reversed(said) if line.strip()), "")
@@ -95,6 +149,7 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--folder", type=pathlib.Path, required=True)
     parser.add_argument("--build", type=pathlib.Path, required=True)
+    parser.add_argument("--at-once", type=int, default=1, help="machines that run at one time, each busy on one core or two")
     parser.add_argument("cases", nargs="*")
     wanted = parser.parse_args()
     known = sorted(case.stem for case in CASES.glob("*.py"))
@@ -109,8 +164,9 @@ def main():
     out.mkdir(parents=True)
     programs = [build / "src/cli/groundline", build / "src/daemon/groundlined"]
     programs += (build / "src/daemon").glob("groundline-*.so")  # drivers that are loaded
+    debs = pack(build.resolve(), folder / "shared/debs")
     try:
-        image = make_image(folder, runtime_packages(programs))
+        image = make_image(folder, needed_packages(debs))
     except subprocess.CalledProcessError:
         sys.exit("The image of the virtual robot cannot be made; the lines above say why.")
     shared = folder / "shared"
@@ -122,12 +178,17 @@ def main():
     except machine.Broken as broken:
         sys.exit(f"The virtual robot: {broken}")
     counts = {"passed": 0, "skipped": 0, "failed": 0}
-    for name in cases:
+
+    def judge(name):
         begin = time.monotonic()
         status, why = run_case(robot, name, shared, out)
         word = {0: "passed", SKIPPED: "skipped"}.get(status, "failed")
-        counts[word] += 1
         print(f"{word:8} {name:22} {time.monotonic() - begin:4.0f} s  {why}", flush=True)
+        return word
+
+    with concurrent.futures.ThreadPoolExecutor(wanted.at_once) as machines:
+        for word in machines.map(judge, cases):
+            counts[word] += 1
     print(", ".join(f"{count} {word}" for word, count in counts.items()) + f"; logs are in {wanted.folder / 'cases'}.")
     sys.exit(1 if counts["failed"] else 0)
 
