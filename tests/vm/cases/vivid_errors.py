@@ -22,8 +22,11 @@ def case(stack):
     raised("camera_gaps", lambda: inject(left, "percentage_of_dropped_buffers", 50))
     inject(left, "percentage_of_dropped_buffers", 0)
     raised("camera_damaged", lambda: inject(right, "inject_v4l2_buf_flag_error"))
-    for control in ("inject_vidioc_qbuf_error", "inject_fatal_streaming_error"):
+    # At once and for what it is, not as a camera that is silent, which would do in the end as well.
+    for control, why in (("inject_vidioc_qbuf_error", "does not take its buffer back"),
+                         ("inject_fatal_streaming_error", "Input/output error")):
         raised("camera_restarts", lambda control=control: inject(left, control))
+        robot.expect(why in daemon.said(), f"after {control} the log does not say: {why}")
 
     def start_fails():
         inject(right, "inject_vidioc_streamon_error")
