@@ -13,6 +13,8 @@ enum class Count : std::uint8_t {
     kFramesBad,          // pairs a source could not read
     kFramesOverwritten,  // dropped before processing: a newer pair came
     kFramesProcessed,
+    kFramesHalved,        // of those, at half the resolution
+    kResolutionChanges,   // from full to half resolution or back
     kResultsOverwritten,  // dropped before the sinks: a newer result came
     kResultsDelivered,    // handed to all sinks
     kSinkFailures,
@@ -29,10 +31,11 @@ enum class Count : std::uint8_t {
     kCount,
 };
 inline constexpr std::array<std::string_view, static_cast<std::size_t>(Count::kCount)> kCountNames = {
-    "frames_read",       "frames_bad",       "frames_overwritten", "frames_processed", "results_overwritten",
-    "results_delivered", "sink_failures",    "disparity_clamped",  "publish_failures", "health_overwritten",
-    "camera_gaps",       "camera_damaged",   "camera_left_out",    "camera_singles",   "camera_superseded",
-    "camera_restarts",   "attitudes_refused"};
+    "frames_read",       "frames_bad",         "frames_overwritten",  "frames_processed",
+    "frames_halved",     "resolution_changes", "results_overwritten", "results_delivered",
+    "sink_failures",     "disparity_clamped",  "publish_failures",    "health_overwritten",
+    "camera_gaps",       "camera_damaged",     "camera_left_out",     "camera_singles",
+    "camera_superseded", "camera_restarts",    "attitudes_refused"};
 
 // Raised from any thread, wait-free; a reader sees each counter on its own, not a common instant.
 class Counters {

@@ -46,6 +46,7 @@ enum class Reason : std::uint8_t {
     kOverload,        // frames were skipped or shrunk to keep up
     kUnchecked,       // disparities are answered without checks
     kIdentical,       // left and right are one and the same picture
+    kHalfResolution,  // looked at at half the resolution
     kCount,
 };
 inline constexpr int kReasons = static_cast<int>(Reason::kCount);
@@ -54,7 +55,7 @@ inline constexpr std::array<std::string_view, static_cast<std::size_t>(kReasons)
     "outside_gate", "pose_jump",    "ambiguous",      "uneven",      "uncertain_pose", "blocked_view",
     "wall",         "no_ground",    "held_ground",    "photometric", "overexposed",    "dark",
     "frozen",       "swapped",      "unsynchronised", "epipolar",    "blurred",        "overload",
-    "unchecked",    "identical"};
+    "unchecked",    "identical",    "half_resolution"};
 
 // A set of reasons, as the bit mask that goes out in messages.
 class Reasons {
@@ -120,8 +121,9 @@ struct GroundEvidence {
 struct Evidence {
     bool calibrated = false;
     bool mount_prior = false;
-    bool overloaded = false;  // the pair's mode is not kFull
-    bool checked = true;      // disparities passed validity checks; if not, every pixel counts as valid
+    bool overloaded = false;       // the pair's mode is not kFull
+    bool half_resolution = false;  // matched and judged at half the resolution
+    bool checked = true;           // disparities passed validity checks; if not, every pixel counts as valid
     PhotometricEvidence photometric;
     PairEvidence pair;
     GroundEvidence ground_fit;

@@ -43,7 +43,8 @@ struct FrameStamp {
 // with the pair, and from then on an input like its pixels.
 enum class FrameMode : std::uint8_t {
     kFull = 0,
-    kSkipping = 1,  // pairs before it were skipped, again and again
+    kSkipping = 1,        // pairs before it were skipped, again and again
+    kHalfResolution = 2,  // nor did skipping suffice: this pair is looked at at half the resolution
 };
 
 // Memory for one pair, allocated once; sources write into it. Images are as delivered, not yet rectified.

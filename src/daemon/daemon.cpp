@@ -86,6 +86,13 @@ settings::Settings with_disparities(settings::Settings settings, const SourceInf
     return settings;
 }
 
+pipeline::ProcessorConfig processor_config(const settings::Settings& settings, const SourceInfo& info,
+                                           Arena& arena) {
+    pipeline::ProcessorConfig config = setup::processor_config(settings, info, false, arena);
+    config.half_resolution = settings.overload.half_resolution;
+    return config;
+}
+
 // Everything with its memory, in the order it is needed; nothing moves yet but the workers that wait.
 struct Parts {
     explicit Parts(const settings::Settings& wanted)
@@ -96,7 +103,7 @@ struct Parts {
                                 : rig::Rectifier(info().width, info().height)),
           real_time(settings.realtime),
           pool(lanes_of(settings), [this] { real_time.adopt(pipeline::ThreadRole::kProcessing); }),
-          processor(setup::processor_config(settings, info(), false, arena), rectifier, pool, arena),
+          processor(processor_config(settings, info(), arena), rectifier, pool, arena),
           tracker(&counters, stale_after_ns(info())),
           publisher(lcm_options(settings, counters, &tracker)),
           health(lcm_options(settings, counters)),

@@ -9,7 +9,6 @@
 #include "pipeline/pacer.hpp"
 #include "pipeline/ring.hpp"
 #include "pipeline/triple_buffer.hpp"
-#include "verdict/overload.hpp"
 
 namespace groundline::pipeline {
 namespace {
@@ -158,15 +157,23 @@ void Pipeline::capture(const RunOptions& options, const std::atomic<bool>& stop,
 }
 
 void Pipeline::process(const RunOptions& options, RunReport& report) {
-    const verdict::OverloadLimits limits;
+    verdict::OverloadLimits limits = options.overload;
+    limits.may_halve = processor_.may_halve();
     verdict::OverloadState overload;
     std::uint64_t lost_before = 0;
+    std::int64_t busy_ns = 0;
+    bool was_half = false;
     while (CaptureSlot* captured = captured_->take()) {
+        const std::int64_t begin_ns = now_mono_ns();
         if (const Tuning* tuning = tuning_.newest()) processor_.tune(*tuning);
         const std::uint64_t lost = counters_.get(Count::kFramesOverwritten);
-        overload = verdict::next_overload(overload, lost - lost_before, captured->arrival_mono_ns, limits);
+        overload = verdict::next_overload(overload, {lost - lost_before, busy_ns, captured->arrival_mono_ns},
+                                          limits);
         lost_before = lost;
-        if (overload.overloaded) captured->frame.mode = FrameMode::kSkipping;
+        if (overload.half)
+            captured->frame.mode = FrameMode::kHalfResolution;
+        else if (overload.overloaded)
+            captured->frame.mode = FrameMode::kSkipping;
         ResultSlot* finished = finished_->begin_write();
         if (finished == nullptr) break;
         processor_.process(captured->frame, finished->result);
@@ -177,9 +184,14 @@ void Pipeline::process(const RunOptions& options, RunReport& report) {
              {Stage::kRead, Stage::kRectify, Stage::kMatch, Stage::kGround, Stage::kClassify})
             report.stages[static_cast<std::size_t>(stage)].add(times[static_cast<std::size_t>(stage)]);
         counters_.add(Count::kFramesProcessed);
+        const bool half = finished->result.evidence.half_resolution;
+        if (half) counters_.add(Count::kFramesHalved);
+        if (half != was_half) counters_.add(Count::kResolutionChanges);
+        was_half = half;
         captured_->release();
         if (finished_->commit()) counters_.add(Count::kResultsOverwritten);
         if (options.rest) rest();
+        busy_ns = now_mono_ns() - begin_ns;
     }
     finished_->end_of_stream();
 }

@@ -20,6 +20,7 @@
 #include "pipeline/hand_over.hpp"
 #include "pipeline/processor.hpp"
 #include "pipeline/triple_buffer.hpp"
+#include "verdict/overload.hpp"
 
 namespace groundline::pipeline {
 
@@ -47,6 +48,8 @@ struct RunOptions {
     // that. Null: the source's own attitude, if it has one.
     AttitudeHandOver* attitude = nullptr;
     std::int64_t attitude_max_gap_ns = 0;
+    // When frames are said to be skipped, or looked at at half the resolution where the processor can.
+    verdict::OverloadLimits overload = {};
     // Called once on each thread before its first frame; empty: nothing.
     std::function<void(ThreadRole)> on_thread = {};
 };

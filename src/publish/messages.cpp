@@ -75,7 +75,8 @@ static_assert(is_bit_of(mask_t::REASON_BLURRED, Reason::kBlurred));
 static_assert(is_bit_of(mask_t::REASON_OVERLOAD, Reason::kOverload));
 static_assert(is_bit_of(mask_t::REASON_UNCHECKED, Reason::kUnchecked));
 static_assert(is_bit_of(mask_t::REASON_IDENTICAL, Reason::kIdentical));
-static_assert(kReasons == 26);
+static_assert(is_bit_of(mask_t::REASON_HALF_RESOLUTION, Reason::kHalfResolution));
+static_assert(kReasons == 27);
 
 // Bytes of data that leave room for the other fields of vdisparity_t and image_t.
 constexpr std::size_t kMaxDataBytes = kMaxMaskBytes;

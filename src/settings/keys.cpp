@@ -274,6 +274,15 @@ void add_daemon_keys(std::vector<Key>& keys) {
     keys.push_back(whole("process.threads", 0, 256,
                          "Daemon: threads that share a frame; 0 is one for each processor.",
                          GROUNDLINE_MEMBER(process.threads)));
+    using verdict::HalfResolution;
+    keys.push_back(choice<HalfResolution>(
+        "overload.half_resolution",
+        {{"auto", HalfResolution::kWhenOverloaded},
+         {"never", HalfResolution::kNever},
+         {"always", HalfResolution::kAlways}},
+        "Half the resolution, which degrades the verdict: auto is for as long as a daemon that skips pairs "
+        "still does not keep up, and never in a replay; always is every pair, to look at the result.",
+        GROUNDLINE_MEMBER(overload.half_resolution)));
     keys.push_back(on_off("realtime.scheduling",
                           "Daemon: run capture, processing and sinks as SCHED_FIFO where that is permitted.",
                           GROUNDLINE_MEMBER(realtime.on)));

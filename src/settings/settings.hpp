@@ -13,6 +13,7 @@
 #include "stereo/matcher.hpp"
 #include "terrain/config.hpp"
 #include "terrain/elevation_grid.hpp"
+#include "verdict/overload.hpp"
 #include "verdict/verdict.hpp"
 
 namespace groundline::capture {
@@ -64,6 +65,10 @@ struct ProcessSettings {
     int threads = 0;  // that share a frame; 0: one a processor
 };
 
+struct OverloadSettings {
+    verdict::HalfResolution half_resolution = verdict::HalfResolution::kWhenOverloaded;
+};
+
 struct PublishSettings {
     std::string url;                    // empty: LCM_DEFAULT_URL, else the library's default
     std::string prefix = "GROUNDLINE";  // channels are PREFIX_MASK, PREFIX_SECTORS, ...
@@ -89,6 +94,7 @@ struct Settings {
     AttitudeSettings attitude;
     CaptureSettings capture;
     ProcessSettings process;
+    OverloadSettings overload;
     RealtimeSettings realtime;
 };
 

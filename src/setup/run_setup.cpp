@@ -53,6 +53,8 @@ pipeline::ProcessorConfig processor_config(const settings::Settings& settings, c
     config.limits = settings::verdict_limits(settings);
     config.colour = colour;
     config.live = source.live;
+    if (settings.overload.half_resolution == verdict::HalfResolution::kAlways)
+        config.half_resolution = verdict::HalfResolution::kAlways;
     config.body = io::read_body_mask(settings.mount.body_mask, source.width, source.height, arena);
     return config;
 }

@@ -33,7 +33,9 @@ std::optional<rig::StereoCalibration> load_calibration(std::vector<std::filesyst
 void choose_disparities(int width, int hint, settings::Settings& settings);
 
 // For pairs of that source; `colour`: it has colour and something draws it. The mask of the robot's own parts
-// is read into the arena. Throws Refusal(kConfig) as settings::terrain_config() and io::read_body_mask() do.
+// is read into the arena. Pairs are looked at at half the resolution where that is set for all of them;
+// whoever lets overload decide says so in the result. Throws Refusal(kConfig) as settings::terrain_config()
+// and io::read_body_mask() do.
 pipeline::ProcessorConfig processor_config(const settings::Settings& settings, const SourceInfo& source,
                                            bool colour, Arena& arena);
 

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "core/half_size.hpp"
 #include "stereo/census.hpp"
 
 namespace groundline::stereo {
@@ -40,9 +41,6 @@ constexpr CoarseRange coarse_range(int min_disparity, int disparities) {
     const int first = min_disparity >> 1;
     const int count = ((min_disparity + disparities - 1) >> 1) - first + 1;
     return {first, (count + 15) / 16 * 16};
-}
-constexpr int halved(int size) {
-    return (size + 1) / 2;
 }
 
 }  // namespace groundline::stereo

@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "stereo/census_rows.hpp"
+#include "stereo/halve.hpp"
 #include "stereo/median.hpp"
 #include "stereo/pyramid.hpp"
 #include "stereo/pyramid_kernels.hpp"
@@ -44,15 +45,6 @@ MatcherConfig coarse_config(const MatcherConfig& config) {
     coarse.disparities = range_of(config).disparities;
     coarse.limits.subpixel = true;
     return coarse;
-}
-
-void halve_row(const std::uint8_t* above, const std::uint8_t* below, int width, std::uint8_t* out) {
-    const int pairs = width / 2;
-    for (int x = 0; x < pairs; ++x)
-        out[x] = static_cast<std::uint8_t>(
-            (above[2 * x] + above[2 * x + 1] + below[2 * x] + below[2 * x + 1] + 2) >> 2);
-    if (width % 2 != 0)
-        out[pairs] = static_cast<std::uint8_t>((2 * above[width - 1] + 2 * below[width - 1] + 2) >> 2);
 }
 
 }  // namespace
@@ -142,11 +134,8 @@ void PyramidMatcher::match(ConstLuma left, ConstLuma right, const DisparityMap& 
     };
     parallel.for_each(parts, [&](int number, int /*lane*/) {
         const Part part = part_of(number);
-        for (int y = part.first; y < part.last; y += 2) {
-            const int below = std::min(y + 1, height_ - 1);
-            halve_row(left.row(y), left.row(below), width_, half_left_.row(y / 2));
-            halve_row(right.row(y), right.row(below), width_, half_right_.row(y / 2));
-        }
+        halve_rows(left, part.first / 2, halved(part.last), half_left_);
+        halve_rows(right, part.first / 2, halved(part.last), half_right_);
     });
     coarse_->match(half_left_, half_right_, coarse_map_, parallel);
     parallel.for_each(parts, [&](int number, int lane_number) {

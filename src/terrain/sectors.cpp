@@ -62,7 +62,7 @@ struct SectorFinder::View {
 };
 
 SectorFinder::SectorFinder(const TerrainConfig& config, const RectifiedRig& rig, int min_disparity,
-                           int disparities, Arena& arena)
+                           int disparities, Arena& arena, const RectifiedRig& shared)
     : config_(config),
       rig_(rig),
       last_disparity_(min_disparity + disparities - 1),
@@ -81,8 +81,8 @@ SectorFinder::SectorFinder(const TerrainConfig& config, const RectifiedRig& rig,
     below_ = arena.take<std::uint32_t>(sectors);
     if (!rig.calibrated) return;
     const double yaw = det::radians(config.mount_yaw_deg);
-    first_bearing_rad_ = yaw + det::atan(rig.cx_px / rig.focal_px);
-    const double last = yaw - det::atan((rig.width - 1 - rig.cx_px) / rig.focal_px);
+    first_bearing_rad_ = yaw + det::atan(shared.cx_px / shared.focal_px);
+    const double last = yaw - det::atan((shared.width - 1 - shared.cx_px) / shared.focal_px);
     width_rad_ = (first_bearing_rad_ - last) / count_;
     for (std::size_t i = 0; i < sectors; ++i) {
         const double right = first_bearing_rad_ - static_cast<double>(i + 1) * width_rad_;

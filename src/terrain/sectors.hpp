@@ -21,8 +21,13 @@ class SectorFinder {
   public:
     // Sectors of equal width share the left camera's field of view, turned by the mount's yaw, from left to
     // right; a pixel that falls outside (a camera beside the body's middle) counts in the outermost one.
+    // `shared` is the rig whose field of view that is: of a picture at half its size the whole one's, so that
+    // both have the same sectors.
     SectorFinder(const TerrainConfig& config, const RectifiedRig& rig, int min_disparity, int disparities,
-                 Arena& arena);
+                 Arena& arena, const RectifiedRig& shared);
+    SectorFinder(const TerrainConfig& config, const RectifiedRig& rig, int min_disparity, int disparities,
+                 Arena& arena)
+        : SectorFinder(config, rig, min_disparity, disparities, arena, rig) {}
 
     // Fills `sectors` from a classified frame; leaves it empty where the ground was not found or has no
     // metres, or the rig is not calibrated. `range_limit_m` is the classifier's. Ranges are along the ground

@@ -24,8 +24,8 @@ constexpr Reasons kUnusable =
     set_of({Reason::kNoGround, Reason::kWall, Reason::kOutsideGate, Reason::kPoseJump, Reason::kAmbiguous,
             Reason::kFewInliers, Reason::kShortLine});
 constexpr Reasons kInformative = set_of({Reason::kNoMountPrior});
-constexpr Reasons kRemembered =
-    set_of({Reason::kNoMountPrior, Reason::kUncalibrated, Reason::kUnchecked, Reason::kOverload});
+constexpr Reasons kRemembered = set_of({Reason::kNoMountPrior, Reason::kUncalibrated, Reason::kUnchecked,
+                                        Reason::kOverload, Reason::kHalfResolution});
 
 constexpr bool within(Reasons reasons, Reasons allowed) {
     return (reasons.bits() & ~allowed.bits()) == 0;
@@ -150,6 +150,7 @@ Decision decide(const Evidence& evidence, const State& state, std::int64_t now_m
     if (!evidence.mount_prior) reasons.add(Reason::kNoMountPrior);
     if (!evidence.checked) reasons.add(Reason::kUnchecked);
     if (evidence.overloaded) reasons.add(Reason::kOverload);
+    if (evidence.half_resolution) reasons.add(Reason::kHalfResolution);
     judge_pictures(evidence, limits, reasons);
     judge_pair(evidence.pair, limits, reasons);
     judge_ground(evidence, state, fresh, limits, reasons);

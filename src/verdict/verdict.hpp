@@ -103,7 +103,7 @@ struct Decision {
 Decision decide(const Evidence& evidence, const State& state, std::int64_t now_mono_ns, const Limits& limits);
 
 // The state after that decision. Remembered is a ground whose only reasons are kNoMountPrior, kUncalibrated,
-// kUnchecked and kOverload: those are not about what this frame shows.
+// kUnchecked, kOverload and kHalfResolution: those are not about what this frame shows.
 State next_state(const Decision& decision, const State& state, std::int64_t now_mono_ns,
                  const Limits& limits);
 

@@ -180,6 +180,7 @@ TEST(Reasons, AreASetOfStableBits) {
     EXPECT_EQ(kReasonNames[static_cast<std::size_t>(Reason::kHeldGround)], "held_ground");
     EXPECT_EQ(kReasonNames[static_cast<std::size_t>(Reason::kOverload)], "overload");
     EXPECT_EQ(kReasonNames[static_cast<std::size_t>(Reason::kUnchecked)], "unchecked");
+    EXPECT_EQ(kReasonNames[static_cast<std::size_t>(Reason::kHalfResolution)], "half_resolution");
 }
 
 TEST(FrameStamp, CutsLongNamesAndForgetsOldOnes) {

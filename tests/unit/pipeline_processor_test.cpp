@@ -35,27 +35,30 @@ TEST(Processor, NoWindowReachesBeyondTheSourcePicture) {
     const ConstImageView<std::uint8_t> outside = rectifier.outside_left();
     ASSERT_FALSE(outside.empty()) << "the calibration leaves no black frame";
     Serial serial;
-    ProcessorConfig config;
-    config.matcher.disparities = 16;
-    config.matcher.checks = false;
-    Processor processor(config, rectifier, serial, arena);
-    FrameResult result = processor.make_result(arena);
-    StereoFrame frame = StereoFrame::make(arena, kWidth, kHeight, false);
-    const auto texture = test::textured_image(kWidth, kHeight, 5);
-    copy_pixels<std::uint8_t>(texture.view(), frame.left);
-    copy_pixels<std::uint8_t>(texture.view(), frame.right);
-    processor.process(frame, result);
+    for (const auto resolution : {verdict::HalfResolution::kNever, verdict::HalfResolution::kAlways}) {
+        ProcessorConfig config;
+        config.half_resolution = resolution;
+        config.matcher.disparities = 16;
+        config.matcher.checks = false;
+        Processor processor(config, rectifier, serial, arena);
+        FrameResult result = processor.make_result(arena);
+        StereoFrame frame = StereoFrame::make(arena, kWidth, kHeight, false);
+        const auto texture = test::textured_image(kWidth, kHeight, 5);
+        copy_pixels<std::uint8_t>(texture.view(), frame.left);
+        copy_pixels<std::uint8_t>(texture.view(), frame.right);
+        processor.process(frame, result);
 
-    int kept = 0;
-    for (int y = 0; y < kHeight; ++y)
-        for (int x = 0; x < kWidth; ++x) {
-            if (result.disparity.invalid.at(x, y) != Invalid::kNone) continue;
-            ++kept;
-            for (int v = std::max(y - 5, 0); v <= std::min(y + 5, kHeight - 1); ++v)
-                for (int u = std::max(x - 5, 0); u <= std::min(x + 5, kWidth - 1); ++u)
-                    ASSERT_EQ(outside.at(u, v), 0) << x << ", " << y;
-        }
-    EXPECT_GT(kept, 60 * 40) << "the inside of the picture is matched";
+        int kept = 0;
+        for (int y = 0; y < kHeight; ++y)
+            for (int x = 0; x < kWidth; ++x) {
+                if (result.disparity.invalid.at(x, y) != Invalid::kNone) continue;
+                ++kept;
+                for (int v = std::max(y - 5, 0); v <= std::min(y + 5, kHeight - 1); ++v)
+                    for (int u = std::max(x - 5, 0); u <= std::min(x + 5, kWidth - 1); ++u)
+                        ASSERT_EQ(outside.at(u, v), 0) << x << ", " << y;
+            }
+        EXPECT_GT(kept, 60 * 40) << "the inside of the picture is matched";
+    }
 }
 
 }  // namespace

@@ -340,11 +340,13 @@ class WatchingSink final : public Sink {
 
 void run_watched(FrameSource& source, Parallel& parallel, Sink& sink, const RunOptions& options,
                  const std::atomic<bool>& stop, Counters& counters,
-                 const std::function<void(Pipeline&)>& before = {}) {
+                 const std::function<void(Pipeline&)>& before = {},
+                 verdict::HalfResolution half_resolution = verdict::HalfResolution::kNever) {
     Arena arena;
     const rig::Rectifier rectifier(kWidth, kHeight);
     ProcessorConfig config;
     config.matcher.disparities = 16;
+    config.half_resolution = half_resolution;
     Processor processor(config, rectifier, parallel, arena);
     const std::array<SinkSlot, 1> sinks{{{&sink, std::nullopt, true}}};
     Pipeline pipeline(source, processor, sinks, options.pace == Pace::kMax, arena, counters);
@@ -384,6 +386,48 @@ TEST(Pipeline, OverloadIsSaidWhileItLastsAndRecoveredFrom) {
     run_watched(source, load, sink, options, stop, counters);
     EXPECT_EQ(phase, 2) << "0: overload was never said; 1: it was never over";
     EXPECT_GT(counters.get(Count::kFramesOverwritten), 0U);
+}
+
+TEST(Pipeline, HalvesTheResolutionWhereSkippingDoesNotSufficeAndComesBack) {
+    ScriptedSource source(100'000);
+    SlowParallel load;
+    Counters counters;
+    std::atomic<bool> stop{false};
+    std::int64_t seen_ns = 0;
+    int phase = 0;  // loaded, skipping, halved, whole again
+    load.delay_ms = 20;
+    WatchingSink sink([&](const FrameResult& result) {
+        const bool half = result.reasons.has(Reason::kHalfResolution);
+        const bool said = result.reasons.has(Reason::kOverload);
+        EXPECT_TRUE(said || !half) << "something is given up";
+        EXPECT_EQ(result.mask.width, kWidth);
+        if (phase == 0 && said) {
+            phase = 1;
+            EXPECT_FALSE(half) << "skipping is tried first";
+        }
+        if (phase == 1 && half) {
+            phase = 2;
+            EXPECT_NE(result.verdict, Verdict::kTrusted);
+            load.delay_ms = 0;
+        }
+        if (phase == 2 && !half) {
+            phase = 3;
+            EXPECT_FALSE(said) << "at half resolution it kept up";
+            stop = true;
+        }
+        if (seen_ns == 0) seen_ns = result.stamp.exposure_mono_ns;
+        if (result.stamp.exposure_mono_ns - seen_ns > 200'000'000'000) stop = true;
+    });
+    RunOptions options;
+    options.pace = Pace::kFixed;
+    options.rate_hz = 50.0;
+    options.stamp_when_due = true;
+    options.overload.window_ns = 300'000'000;
+    run_watched(source, load, sink, options, stop, counters, {}, verdict::HalfResolution::kWhenOverloaded);
+    EXPECT_EQ(phase, 3) << "0: overload was never said; 1: nor half resolution; 2: it did not end";
+    EXPECT_GT(counters.get(Count::kFramesHalved), 0U);
+    EXPECT_LT(counters.get(Count::kFramesHalved), counters.get(Count::kFramesProcessed));
+    EXPECT_GE(counters.get(Count::kResolutionChanges), 2U);
 }
 
 TEST(Pipeline, ALosslessRunIsNeverOverloaded) {

@@ -118,6 +118,8 @@ const std::vector<Rule>& rules() {
          [](E& e) { e.calibrated = e.ground.metric = false; }},
         {"unchecked", Reason::kUnchecked, GroundUse::kWeak, [](E&) {}, [](E& e) { e.checked = false; }},
         {"overload", Reason::kOverload, GroundUse::kWeak, [](E&) {}, [](E& e) { e.overloaded = true; }},
+        {"half resolution", Reason::kHalfResolution, GroundUse::kWeak, [](E&) {},
+         [](E& e) { e.half_resolution = true; }},
         {"density", Reason::kLowDensity, GroundUse::kWeak, [](E& e) { e.ground_fit.density = 0.15; },
          [](E& e) { e.ground_fit.density = below(0.15); }},
         {"density NaN", Reason::kLowDensity, GroundUse::kWeak, [](E&) {},
@@ -432,9 +434,9 @@ TEST(Memory, RemembersOnlyGroundsThatPassedEveryCheck) {
         rule.beyond(evidence);
         Drive run;
         run.step(evidence, 0);
-        EXPECT_EQ(run.state.has_ground, rule.reason == Reason::kUncalibrated ||
-                                            rule.reason == Reason::kUnchecked ||
-                                            rule.reason == Reason::kOverload);
+        EXPECT_EQ(run.state.has_ground,
+                  rule.reason == Reason::kUncalibrated || rule.reason == Reason::kUnchecked ||
+                      rule.reason == Reason::kOverload || rule.reason == Reason::kHalfResolution);
     }
     Evidence evidence = good_evidence();
     evidence.mount_prior = false;

@@ -38,6 +38,7 @@ def one_try(stack, devices, settings, frames, form, feeds, least):
     """A sentence, or None where a mask was lost on its way here, so that nobody knows what was processed."""
     radio = robot.Radio(stack)
     daemon = robot.Daemon(stack, **devices, **settings, mount_body__mask=robot.NUMBER_MASK, publish_preview="on",
+                          overload_half__resolution="never",
                           capture_calibration=robot.FRAMES / "calib.txt")
     feeder = robot.feed(stack, *feeds, form=form, rate=2)
     robot.until(lambda: len(radio.listen().masks) >= least or not feeder.running(), f"{least} masks", 300)
