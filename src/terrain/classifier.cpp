@@ -12,7 +12,8 @@
 namespace groundline::terrain {
 namespace {
 
-constexpr int kBits = 16;  // of the limits' fraction, beside sixteenths: a millionth of a pixel
+constexpr int kBits = 16;          // of the limits' fraction, beside sixteenths: a millionth of a pixel
+constexpr double kFarShare = 0.5;  // of the certified range; beyond it a thing is far
 // |ground disparity| anywhere in the picture; beyond 1000 px a step over 64 columns would overflow.
 constexpr double kLargestPx = 1000.0;
 constexpr double kOne = static_cast<double>(std::int32_t{1} << kBits) * kDisparityOne;
@@ -131,6 +132,14 @@ double Classifier::certify_columns(const Wedge& wedge) {
     }
     if (!rig_.calibrated || farthest_px > last_disparity_ + 1.0) return 0.0;
     return rig_.focal_px * rig_.baseline_m / farthest_px;
+}
+
+// The measured disparity at kFarShare of the farthest certified range.
+int Classifier::far_q4() const {
+    const auto columns = certified_q4_.first(static_cast<std::size_t>(rig_.width));
+    const double offset_q4 = rig_.calibrated ? rig_.offset_px() * kDisparityOne : 0.0;
+    const double least_q4 = *std::min_element(columns.begin(), columns.end()) - offset_q4;
+    return static_cast<int>(std::clamp(offset_q4 + least_q4 / kFarShare, -1e6, 1e6));
 }
 
 // Whether a band's limits grow evenly with the disparity, and then these: above the plane itself, where all
@@ -282,9 +291,13 @@ void Classifier::classify(ConstDisparityMap map, const Ground& ground, GroundUse
     rules.min_area = config_.min_area_m2;
     rules.clearance = metric ? config_.clearance_m / ground.pose.height_m : 0.0;
     rules.min_pixels = config_.min_pixels;
+    rules.min_pixels_far = config_.min_pixels_far;
+    rules.far_q4 = far_q4();
     rules.range_edge_q4 = last_disparity_ * kDisparityOne;
     components_.find(map, rules, out, things_);
-    outline_.apply(config_.gap_px, config_.blur_px, map.invalid, out);
+    outline_.apply(
+        {config_.gap_px, config_.blur_px, config_.blur_beyond_px, config_.blur_px, config_.blur_px},
+        map.invalid, out);
     obstacles_of(things_, rig_, ground, config_.sigma_disparity_px, obstacles);
 }
 

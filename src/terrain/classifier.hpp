@@ -58,6 +58,7 @@ class Classifier {
 
     Wedge wedge_of(const Ground& ground) const;
     double certify_columns(const Wedge& wedge);
+    int far_q4() const;
     bool even_limits(const Wedge& wedge, GroundUse use, const GroundSurface& surface, int band,
                      double uncertain_px, kernels::EvenLimits& limits) const;
     void make_within(const Wedge& wedge, GroundUse use, const GroundSurface& surface);

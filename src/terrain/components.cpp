@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <cassert>
+#include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <limits>
@@ -360,10 +361,13 @@ void Components::find(ConstDisparityMap map, const ThingRules& rules, Mask mask,
                       FixedVector<Thing, kMaxObstacles>& things) {
     assert(map.width() == depths_.width && map.height() == depths_.height);
     things.clear();
+    const double most_far = rules.min_area / (rules.unit_px * rules.unit_px * rules.min_pixels_far);
     for (std::size_t i = 0; i < weights_.size(); ++i) {
         const double true_px = (first_q4_ + static_cast<double>(i)) * (1.0 / kDisparityOne) - rules.offset_px;
         const double inverse_px = 1.0 / std::max(true_px, 1.0 / kDisparityOne);
-        weights_[i] = {inverse_px, static_cast<std::uint64_t>(inverse_px * inverse_px * kAreaOne + 0.5)};
+        double area = inverse_px * inverse_px;
+        if (first_q4_ + static_cast<int>(i) < rules.far_q4) area = std::min(area, most_far);
+        weights_[i] = {inverse_px, static_cast<std::uint64_t>(std::ceil(area * kAreaOne))};
     }
     first_run_[0] = 0;
     for (int v = 0; v < map.height(); ++v) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <span>
 
 #include "core/arena.hpp"
@@ -24,6 +25,10 @@ struct ThingRules {
     // The area is the size filter; this is a floor against chance: at long range few pixels already have the
     // area, and outliers of the matching that touch each other would do.
     int min_pixels = 12;
+    // The same for what is measured below far_q4: such a pixel counts for at most 1/min_pixels_far of the
+    // least area.
+    int min_pixels_far = 12;
+    int far_q4 = std::numeric_limits<int>::min();
     int range_edge_q4 = 0;  // what a range-edge pixel counts as, measured
 };
 

@@ -72,10 +72,17 @@ struct TerrainConfig {
     // Unmatched gaps up to twice this many px inside obstacles are obstacle: leaves, mesh and shadow leave
     // them.
     int gap_px = 8;
-    // Ground nearer than this to an obstacle or a drop is unknown: the windows that match it see both.
+    // Ground nearer than this to a drop, or beside an obstacle, is unknown: the windows that match it see
+    // both.
     int blur_px = 4;
+    // The same beyond an obstacle, up the picture: its upper edge is often matched as the ground far behind,
+    // and of obstacles called free most lie there.
+    int blur_beyond_px = 8;
     // Fewest pixels of a thing at any range; chance clusters of 5 % outliers stay below 8.
     int min_pixels = 12;
+    // The same beyond half the certified range, where a false match of a patch of ground at the horizon
+    // stands up: on empty ground such patches have 12 to 38 px. A box of 0.3 m has 56 at 20 m (f = 500 px).
+    int min_pixels_far = 40;
 
     // Takes over what may change between two frames: tolerances, clearance and stopping distance. No memory
     // and no map depends on them.

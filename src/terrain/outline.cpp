@@ -40,13 +40,13 @@ std::uint64_t not_zero(std::uint64_t bytes) {
     return (bytes + 0x7f * kEach) >> 7U & kEach;
 }
 
-// Calls change(reach) with steps that together reach `reach_px`, each at most one more than all before it:
-// then a step needs nothing of what lies outside the picture.
+// Calls step(reached, by) with steps that together reach `reach_px`, each at most one more than all before
+// it: then a step needs nothing of what lies outside the picture.
 template <typename Step>
 void in_steps(int reach_px, Step step) {
     for (int reached = 0; reached < reach_px;) {
         const int by = std::min({reached + 1, reach_px - reached, kBits / 2});
-        step(by);
+        step(reached, by);
         reached += by;
     }
 }
@@ -58,17 +58,17 @@ void Outline::take(Arena& arena, int width, int height) {
     height_ = height;
     words_ = (width + kBits - 1) / kBits;
     last_word_ = ~Word{0} >> static_cast<unsigned>(words_ * kBits - width);
-    for (Plane* plane : {&obstacles_, &things_, &along_, &across_, &spare_})
+    for (Plane* plane : {&obstacles_, &drops_, &along_, &across_, &spare_})
         *plane = arena.take<Word>(static_cast<std::size_t>(words_ + 2) * static_cast<std::size_t>(height));
 }
 
-// Fills obstacles_ and things_; returns whether there are any.
+// Fills obstacles_ and drops_; returns whether there are any.
 bool Outline::collect(ConstMask mask) {
     Word any = 0;
     for (int v = 0; v < height_; ++v) {
         const TerrainClass* kinds = mask.row(v);
         Word* obstacles = row(obstacles_, v);
-        Word* things = row(things_, v);
+        Word* drops = row(drops_, v);
         for (int i = 0; i < words_; ++i) {
             Word low = 0;
             Word high = 0;
@@ -81,7 +81,7 @@ bool Outline::collect(ConstMask mask) {
             }
             if (i == words_ - 1) high &= last_word_;
             obstacles[i] = high & ~low;
-            things[i] = high;
+            drops[i] = high & low;
             any |= high;
         }
     }
@@ -94,7 +94,7 @@ void Outline::widen_along(Plane plane, int reach_px) {
         Word* here = row(plane, v);
         if (std::all_of(here, here + words_, [](Word word) { return word == 0; })) continue;
         Word* before = row(spare_, 0);
-        in_steps(reach_px, [&](int by) {
+        in_steps(reach_px, [&](int /*reached*/, int by) {
             std::copy_n(here, words_, before);
             for (int i = 0; i < words_; ++i)
                 here[i] = before[i] | before[i] << by | before[i - 1] >> (kBits - by) | before[i] >> by |
@@ -104,13 +104,15 @@ void Outline::widen_along(Plane plane, int reach_px) {
     }
 }
 
-// Sets what lies within reach_px of a set bit of its column.
-void Outline::widen_across(Plane& plane, int reach_px) {
-    in_steps(reach_px, [&](int by) {
+// Sets what lies in a column at most up_px above a set bit or down_px below one.
+void Outline::widen_across(Plane& plane, int up_px, int down_px) {
+    in_steps(std::max(up_px, down_px), [&](int reached, int by) {
+        const int up = std::clamp(up_px - reached, 0, by);
+        const int down = std::clamp(down_px - reached, 0, by);
         for (int v = 0; v < height_; ++v) {
             const Word* here = row(plane, v);
-            const Word* above = row(plane, std::max(v - by, 0));
-            const Word* below = row(plane, std::min(v + by, height_ - 1));
+            const Word* above = row(plane, std::max(v - down, 0));
+            const Word* below = row(plane, std::min(v + up, height_ - 1));
             Word* out = row(spare_, v);
             for (int i = 0; i < words_; ++i)
                 out[i] = here[i] | above[i] | below[i];
@@ -135,14 +137,13 @@ void Outline::fill_gaps(int gap_px, ConstImageView<Invalid> invalid, Mask mask) 
     invert(along_);
     widen_along(along_, gap_px);
     std::copy(obstacles_.begin(), obstacles_.end(), across_.begin());
-    widen_across(across_, gap_px);
+    widen_across(across_, gap_px, gap_px);
     invert(across_);
-    widen_across(across_, gap_px);
+    widen_across(across_, gap_px, gap_px);
     for (int v = 0; v < height_; ++v) {
-        const Word* obstacles = row(obstacles_, v);
+        Word* obstacles = row(obstacles_, v);
         const Word* open_along = row(along_, v);
         const Word* open_across = row(across_, v);
-        Word* things = row(things_, v);
         for (int i = 0; i < words_; ++i) {
             Word gaps = ~(open_along[i] & open_across[i]) & ~obstacles[i];
             if (i == words_ - 1) gaps &= last_word_;
@@ -154,22 +155,28 @@ void Outline::fill_gaps(int gap_px, ConstImageView<Invalid> invalid, Mask mask) 
                 const std::uint64_t filled = bytes_of(gaps >> first & 0xffU) & unmatched & ~not_zero(eight);
                 const std::uint64_t result = eight | filled << 1U;
                 std::memcpy(kinds, &result, sizeof result);
-                things[i] |= bits_of(filled) << first;
+                obstacles[i] |= bits_of(filled) << first;
                 gaps &= ~(Word{0xff} << first);
             }
         }
     }
 }
 
-void Outline::blur(int blur_px, Mask mask) {
-    std::copy(things_.begin(), things_.end(), along_.begin());
-    widen_along(along_, blur_px);
-    widen_across(along_, blur_px);
+void Outline::blur(const OutlineReach& reach, Mask mask) {
+    std::copy(obstacles_.begin(), obstacles_.end(), along_.begin());
+    widen_along(along_, reach.beside);
+    widen_across(along_, reach.beyond, reach.before);
+    std::copy(drops_.begin(), drops_.end(), across_.begin());
+    widen_along(across_, reach.lip);
+    widen_across(across_, reach.lip, reach.lip);
     for (int v = 0; v < height_; ++v) {
-        const Word* near = row(along_, v);
-        const Word* things = row(things_, v);
+        const Word* near_obstacles = row(along_, v);
+        const Word* near_drops = row(across_, v);
+        const Word* obstacles = row(obstacles_, v);
+        const Word* drops = row(drops_, v);
         for (int i = 0; i < words_; ++i) {
-            for (Word beside = near[i] & ~things[i]; beside != 0;) {
+            const Word things = obstacles[i] | drops[i];
+            for (Word beside = (near_obstacles[i] | near_drops[i]) & ~things; beside != 0;) {
                 const int first = std::countr_zero(beside) & ~7;
                 TerrainClass* kinds = mask.row(v) + i * kBits + first;
                 const std::uint64_t eight = load_eight(kinds);
@@ -182,11 +189,11 @@ void Outline::blur(int blur_px, Mask mask) {
     }
 }
 
-void Outline::apply(int gap_px, int blur_px, ConstImageView<Invalid> invalid, Mask mask) {
+void Outline::apply(const OutlineReach& reach, ConstImageView<Invalid> invalid, Mask mask) {
     assert(mask.same_size(width_, height_) && invalid.same_size(width_, height_));
     if (!collect(mask)) return;
-    if (gap_px > 0) fill_gaps(gap_px, invalid, mask);
-    if (blur_px > 0) blur(blur_px, mask);
+    if (reach.gap > 0) fill_gaps(reach.gap, invalid, mask);
+    blur(reach, mask);
 }
 
 }  // namespace groundline::terrain

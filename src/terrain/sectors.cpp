@@ -32,7 +32,7 @@ constexpr double kLeastJump = 0.25;  // m
 constexpr double kJumpSigmas = 6.0;  // of disparity; disparities scatter, and gather near whole pixels
 // Rows that a matched window shows ground beyond a lip, after the classifier has taken off those next to a
 // drop.
-constexpr double kMarginRows = 3.0;
+constexpr double kMarginRows = 4.0;
 constexpr double kMarginSigmas = 1.0;  // of disparity: how well one pixel's row of ground is known
 
 // By true disparity in 1/16 px, linear within an octave; below one pixel all is bin 0.

@@ -76,7 +76,8 @@ TerrainConfig unfiltered() {
     config.min_area_m2 = 0.0;
     config.clearance_m = 1e9;
     config.gap_px = 0;
-    config.blur_px = 0;
+    config.blur_px = config.blur_beyond_px = 0;
+    config.min_pixels_far = 1;
     return config;
 }
 
@@ -269,6 +270,50 @@ TEST(Classifier, RangeLimitIsTheFarthestCertifiedRange) {
     bench.classify(ground);
     EXPECT_EQ(bench.range_limit_m, 0.0);
     EXPECT_EQ(bench.count(TerrainClass::kTraversable), 0);
+}
+
+// Ground is certified up to 16 m (3.75 px).
+TEST(Classifier, BeyondHalfTheCertifiedRangeAThingNeedsFortyPixels) {
+    const RectifiedRig rig = rig_of();
+    Bench bench(rig);
+    World world{rig, pose_deg(12.0, 0.0, 1.0), {}};
+    const Ground ground = ground_of(rig, world.pose);
+    const auto found = [&](int columns, int rows, int disparity_q4) {
+        test::render(world, 0, kDisparities, {}, bench.map);
+        // Its lowest row lies on the ground that is half a pixel and a quarter farther.
+        const double under_px = 0.75 * disparity_q4 / 16.0 - 0.5;
+        const int bottom = static_cast<int>((under_px - ground.plane.d0) / ground.plane.dv);
+        for (int v = bottom - rows + 1; v <= bottom; ++v)
+            for (int u = 100; u < 100 + columns; ++u)
+                bench.map.disparity_q4.at(u, v) = static_cast<std::int16_t>(disparity_q4);
+        bench.classify(ground);
+        EXPECT_NEAR(bench.range_limit_m, 16.0, 1e-9);
+        return bench.obstacles.size();
+    };
+    EXPECT_EQ(found(13, 3, 119), 0U);
+    EXPECT_EQ(found(14, 3, 119), 1U);
+    EXPECT_EQ(found(6, 3, 120), 1U);
+}
+
+// By the defaults: ground is unknown a window's width beside a thing, twice that beyond it.
+TEST(Classifier, GroundBesideAThingIsUnknown) {
+    const RectifiedRig rig = rig_of();
+    Bench bench(rig);
+    World world{rig, pose_deg(12.0, 0.0, 1.0), {}};
+    test::render(world, 0, kDisparities, {}, bench.map);
+    for (int v = 300; v < 320; ++v)
+        for (int u = 100; u < 120; ++u)
+            bench.map.disparity_q4.at(u, v) = 30 * 16;
+    bench.classify(ground_of(rig, world.pose));
+    for (int v = 280; v < 340; ++v)
+        for (int u = 80; u < 140; ++u) {
+            const bool in = u >= 100 && u < 120 && v >= 300 && v < 320;
+            const bool by = u >= 96 && u < 124 && v >= 292 && v < 324;
+            ASSERT_EQ(bench.mask.at(u, v), in   ? TerrainClass::kObstacle
+                                           : by ? TerrainClass::kUnknown
+                                                : TerrainClass::kTraversable)
+                << u << ' ' << v;
+        }
 }
 
 TEST(Classifier, NoPixelBeyondTheRangeLimitIsTraversable) {

@@ -91,6 +91,8 @@ TEST(Components, AreThoseOfAPlainFlood) {
                     scatter(bench, seed, share, smooth);
                     if (picky) {
                         bench.rules.min_pixels = 4;
+                        bench.rules.min_pixels_far = 9;
+                        bench.rules.far_q4 = 22 * 16;
                         bench.rules.unit_px = 0.12;
                         bench.rules.min_area = 2e-4;
                         bench.rules.ground = {0.01, 0.5, -8.0 + seed % 5};
@@ -236,6 +238,28 @@ TEST(Components, TooSmallThingsBecomeUnknown) {
     bench.find();
     EXPECT_TRUE(bench.things.empty());
     EXPECT_EQ(bench.mask.at(31, 31), TerrainClass::kUnknown);
+}
+
+TEST(Components, FarThingsNeedMorePixels) {
+    Bench bench;
+    bench.rules.unit_px = 1.0;
+    bench.rules.min_area = 1e-3;  // two pixels at 20 px have it
+    bench.rules.min_pixels = 2;
+    bench.rules.min_pixels_far = 40;
+    const auto things_of = [&](int pixels, int far_q4) {
+        fill_pixels(bench.mask, TerrainClass::kTraversable);
+        fill_pixels(bench.map.disparity_q4, std::int16_t{20 * 16});
+        for (int i = 0; i < pixels; ++i)
+            bench.mask.at(10 + i % 10, 10 + i / 10) = TerrainClass::kObstacle;
+        bench.rules.far_q4 = far_q4;
+        bench.find();
+        EXPECT_EQ(bench.mask.at(10, 10),
+                  bench.things.empty() ? TerrainClass::kUnknown : TerrainClass::kObstacle);
+        return bench.things.size();
+    };
+    EXPECT_EQ(things_of(2, 20 * 16), 1U);
+    EXPECT_EQ(things_of(39, 20 * 16 + 1), 0U);
+    EXPECT_EQ(things_of(40, 20 * 16 + 1), 1U);
 }
 
 TEST(Components, MedianAndNearTenthAreOfThePixels) {

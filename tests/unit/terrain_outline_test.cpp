@@ -16,8 +16,7 @@ using test::Dice;
 struct Plain {
     ConstMask before;
     ConstImageView<Invalid> invalid;
-    int gap_px;
-    int blur_px;
+    OutlineReach reach;
 
     bool obstacle(int u, int v) const {
         return u >= 0 && v >= 0 && u < before.width && v < before.height &&
@@ -37,7 +36,7 @@ struct Plain {
         if (low == here) return true;
         if (low < 0 && high == size) return false;
         const int gap = high - low - 1;
-        return gap <= (low < 0 || high == size ? gap_px : 2 * gap_px);
+        return gap <= (low < 0 || high == size ? reach.gap : 2 * reach.gap);
     }
     TerrainClass filled(int u, int v) const {
         const TerrainClass kind = before.at(u, v);
@@ -49,16 +48,22 @@ struct Plain {
             return all_filled[static_cast<std::size_t>(y * before.width + x)];
         };
         if (at(u, v) != TerrainClass::kTraversable) return at(u, v);
-        for (int y = std::max(0, v - blur_px); y <= std::min(before.height - 1, v + blur_px); ++y)
-            for (int x = std::max(0, u - blur_px); x <= std::min(before.width - 1, u + blur_px); ++x)
-                if (at(x, y) == TerrainClass::kObstacle || at(x, y) == TerrainClass::kDrop)
+        for (int y = 0; y < before.height; ++y)
+            for (int x = 0; x < before.width; ++x) {
+                const int aside = std::abs(x - u);
+                const int down = v - y;  // of the thing
+                if (at(x, y) == TerrainClass::kObstacle && aside <= reach.beside && down <= reach.before &&
+                    -down <= reach.beyond)
                     return TerrainClass::kUnknown;
+                if (at(x, y) == TerrainClass::kDrop && aside <= reach.lip && std::abs(down) <= reach.lip)
+                    return TerrainClass::kUnknown;
+            }
         return TerrainClass::kTraversable;
     }
 };
 
 // `rarity`: one pixel of this many begins another class.
-void expect_like_plain(int width, int height, int gap_px, int blur_px, std::uint32_t rarity, Dice& dice) {
+void expect_like_plain(int width, int height, const OutlineReach& reach, std::uint32_t rarity, Dice& dice) {
     Arena arena;
     Outline outline;
     outline.take(arena, width, height);
@@ -83,9 +88,9 @@ void expect_like_plain(int width, int height, int gap_px, int blur_px, std::uint
     // Twice: nothing may be left over from another frame.
     for (int round = 0; round < 2; ++round) {
         copy_pixels<TerrainClass>(before, mask);
-        outline.apply(gap_px, blur_px, invalid, mask);
+        outline.apply(reach, invalid, mask);
     }
-    const Plain plain{before, invalid, gap_px, blur_px};
+    const Plain plain{before, invalid, reach};
     std::vector<TerrainClass> filled;
     for (int v = 0; v < height; ++v)
         for (int u = 0; u < width; ++u)
@@ -93,19 +98,24 @@ void expect_like_plain(int width, int height, int gap_px, int blur_px, std::uint
     for (int v = 0; v < height; ++v)
         for (int u = 0; u < width; ++u)
             ASSERT_EQ(mask.at(u, v), plain.after(u, v, filled))
-                << u << ' ' << v << " of " << width << 'x' << height << ", reaches " << gap_px << ' '
-                << blur_px;
+                << u << ' ' << v << " of " << width << 'x' << height << ", reaches " << reach.gap << ' '
+                << reach.beside << ' ' << reach.beyond << ' ' << reach.before << ' ' << reach.lip;
 }
 
 TEST(Outline, IsWhatTheRuleSaysPixelByPixel) {
     Dice dice(11);
+    const auto reaches = [&](int gap_px, std::uint32_t below) {
+        const auto any = [&] { return static_cast<int>(dice.bits() % below); };
+        return OutlineReach{gap_px, any(), any(), any(), any()};
+    };
     for (const int width : {1, 5, 8, 63, 64, 65, 100, 128, 131, 200})
         for (const int gap_px : {0, 1, 2, 3, 8, 40})
             for (const std::uint32_t rarity : {2U, 12U, 60U})
-                expect_like_plain(width, 1 + static_cast<int>(dice.bits() % 40), gap_px,
-                                  static_cast<int>(dice.bits() % 7), rarity, dice);
-    expect_like_plain(150, 60, 8, 75, 60, dice);
-    expect_like_plain(640, 48, 8, 4, 40, dice);
+                expect_like_plain(width, 1 + static_cast<int>(dice.bits() % 40), reaches(gap_px, 7), rarity,
+                                  dice);
+    expect_like_plain(150, 60, {8, 75, 75, 75, 75}, 60, dice);
+    expect_like_plain(150, 60, {8, 3, 70, 0, 1}, 60, dice);
+    expect_like_plain(320, 48, {8, 4, 8, 3, 4}, 40, dice);
 }
 
 TEST(Outline, NothingBecomesTraversableAndThingsStay) {
@@ -123,7 +133,7 @@ TEST(Outline, NothingBecomesTraversableAndThingsStay) {
             invalid.at(u, v) = dice.bits() % 2 == 0 ? Invalid::kNone : Invalid::kTexture;
         }
     copy_pixels<TerrainClass>(before, mask);
-    outline.apply(8, 4, invalid, mask);
+    outline.apply({8, 4, 8, 3, 4}, invalid, mask);
     int filled = 0;
     for (int v = 0; v < 50; ++v)
         for (int u = 0; u < 90; ++u) {

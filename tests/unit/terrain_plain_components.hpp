@@ -76,7 +76,9 @@ inline std::vector<Thing> plain_things(const PlainSearch& search, const Disparit
                 found.depths.push_back(here - first_q4);
                 found.sum_q4 += here;
                 const double side = rules.unit_px * inverse_px(here);
-                found.area += side * side;
+                found.area += here < rules.far_q4
+                                  ? std::min(side * side, rules.min_area / rules.min_pixels_far)
+                                  : side * side;
                 const double ratio =
                     1.0 - (rules.ground.du * x + (rules.ground.dv * y + rules.ground.d0)) * inverse_px(here);
                 thing.ratio_high = std::max(thing.ratio_high, ratio);
@@ -90,7 +92,8 @@ inline std::vector<Thing> plain_things(const PlainSearch& search, const Disparit
             thing.median_px = middle((found.depths.size() + 1) / 2);
             thing.near_px =
                 middle(std::min<std::size_t>((found.depths.size() + 9) / 10, 100)) - rules.offset_px;
-            const bool listed = thing.pixels >= rules.min_pixels && found.area >= rules.min_area;
+            const bool listed =
+                thing.pixels >= rules.min_pixels && found.area >= rules.min_area * (1.0 - 1e-9);
             if (!listed || thing.overhang)
                 for (const auto& [x, y] : found.pixels)
                     mask.at(x, y) = TerrainClass::kUnknown;
