@@ -3,7 +3,7 @@
 #   toolchains/make-sysroot.sh arm64|armhf FOLDER [--suite NAME] [--mirror URL|LINE]... [--keyring FILE]
 # Suite and archives are those this machine's apt uses; with --mirror those named (a URL, or a line as in sources.list),
 # which is how another distribution's sysroot is made, verified by --keyring. Nothing foreign is run and this machine's
-# dpkg stays as it is. Needs root and mmdebstrap. FOLDER is made anew; FOLDER/made, written last, names what is inside.
+# dpkg stays as it is. Needs root and mmdebstrap. FOLDER is made anew; FOLDER/made names what is inside.
 set -euo pipefail
 
 die() {
@@ -105,5 +105,6 @@ done
 rm -rf "$root"/var/{cache,lib}/apt
 
 mv "$root/packages" "$root/made"
+cp "$0" "$root/made-by" # by which ./dev sees whether this script has changed
 chown -R --reference="$root/.." "$root"
 echo "Sysroot of $architecture: $(wc -l <"$root/made") packages, $(du -sh "$root" | cut -f1), made in $SECONDS s."

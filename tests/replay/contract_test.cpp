@@ -101,7 +101,7 @@ TEST(Contract, InterruptedRunsKeepWhatIsDoneAndSaySo) {
     const Folder folder;
     const Outcome outcome = run_groundline(
         {"replay", "synthetic:drive?width=320&height=240&focal=250&frames=100000", "--out", folder.at("out")},
-        1500);
+        folder / "out/frames.jsonl");
     EXPECT_EQ(outcome.status, 130) << outcome.err;
     const Json summary = Json::parse(std::ifstream(folder / "out/summary.json"));
     EXPECT_EQ(summary.at("complete"), false);

@@ -11,17 +11,28 @@
 #include <chrono>
 #include <csignal>
 #include <fstream>
+#include <iterator>
 #include <sstream>
 #include <thread>
 
 namespace groundline::test {
 
-Outcome run_groundline(const std::vector<std::string>& words, int interrupt_after_ms) {
+std::vector<std::string> command_of(const std::string& program, const std::vector<std::string>& words) {
+    std::istringstream emulator(GROUNDLINE_EMULATOR);
+    std::vector<std::string> command{std::istream_iterator<std::string>(emulator), {}};
+    command.push_back(program);
+    command.insert(command.end(), words.begin(), words.end());
+    return command;
+}
+
+Outcome run_groundline(const std::vector<std::string>& words, const std::filesystem::path& interrupt_at) {
     std::array<int, 2> out{};
     std::array<int, 2> err{};
     if (pipe(out.data()) != 0 || pipe(err.data()) != 0) return {};
-    std::vector<char*> arguments{const_cast<char*>("groundline")};
-    for (const std::string& word : words)
+    const std::vector<std::string> command = command_of(GROUNDLINE_PROGRAM, words);
+    std::vector<char*> arguments;
+    arguments.reserve(command.size() + 1);
+    for (const std::string& word : command)
         arguments.push_back(const_cast<char*>(word.c_str()));
     arguments.push_back(nullptr);
     const pid_t child = fork();
@@ -30,16 +41,19 @@ Outcome run_groundline(const std::vector<std::string>& words, int interrupt_afte
         dup2(err[1], STDERR_FILENO);
         for (const int end : {out[0], out[1], err[0], err[1]})
             close(end);
-        execv(GROUNDLINE_PROGRAM, arguments.data());
+        execv(arguments.front(), arguments.data());
         _exit(127);
     }
     close(out[1]);
     close(err[1]);
     std::jthread interrupter;
-    if (interrupt_after_ms > 0)
-        interrupter = std::jthread([=] {
-            std::this_thread::sleep_for(std::chrono::milliseconds(interrupt_after_ms));
-            kill(child, SIGINT);
+    if (!interrupt_at.empty())
+        interrupter = std::jthread([=](const std::stop_token& ended) {
+            std::error_code absent;
+            while (!ended.stop_requested() && (!std::filesystem::exists(interrupt_at, absent) ||
+                                               std::filesystem::file_size(interrupt_at, absent) == 0))
+                std::this_thread::sleep_for(std::chrono::milliseconds(10));
+            if (!ended.stop_requested()) kill(child, SIGINT);
         });
     Outcome outcome;
     std::array<pollfd, 2> open{{{out[0], POLLIN, 0}, {err[0], POLLIN, 0}}};
@@ -58,6 +72,8 @@ Outcome run_groundline(const std::vector<std::string>& words, int interrupt_afte
             }
         }
     }
+    interrupter.request_stop();
+    if (interrupter.joinable()) interrupter.join();
     int status = 0;
     waitpid(child, &status, 0);
     outcome.status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);

@@ -18,8 +18,12 @@ struct Outcome {
     }
 };
 
-// Waits for the end. `interrupt_after_ms` > 0 sends SIGINT that long after the start.
-Outcome run_groundline(const std::vector<std::string>& words, int interrupt_after_ms = 0);
+// The program, the words behind it; in front of it the emulator where this is built for another processor.
+std::vector<std::string> command_of(const std::string& program, const std::vector<std::string>& words);
+
+// Waits for the end. Sends SIGINT as soon as there is something in the file `interrupt_at`, where one is
+// named.
+Outcome run_groundline(const std::vector<std::string>& words, const std::filesystem::path& interrupt_at = {});
 
 // Every file below `folder` with its bytes as one text, for comparing whole results; `without` are left out.
 std::string contents(const std::filesystem::path& folder, const std::vector<std::string>& without = {});
