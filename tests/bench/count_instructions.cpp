@@ -74,7 +74,8 @@ extern "C" {
         if (argument == "functions=on" || argument == "functions=off") {
             by_function = argument == "functions=on";
         } else {
-            std::fprintf(stderr, "count_instructions does not know '%s'; it takes functions=on or functions=off.\n",
+            std::fprintf(stderr,
+                         "count_instructions does not know '%s'; it takes functions=on or functions=off.\n",
                          arguments[i]);
             return -1;
         }
