@@ -287,6 +287,23 @@ TEST(Sectors, LipEndsWhatIsFreeThoughNothingBehindItIsADrop) {
     EXPECT_LT(sector.free_range_m, 1.8);
 }
 
+// Wherever in a stretch of rows the lip is; at most a stretch, the margin and the deviation's rows are lost.
+TEST(Sectors, WhatIsFreeEndsFourRowsBeforeALip) {
+    for (double from_m = 1.65; from_m < 2.0; from_m += 0.003) {
+        Strip strip(1.0);
+        strip.hide(from_m, 2.4);
+        const double free_range_m = strip.ahead().free_range_m;
+        int lip = 0;  // the nearest row that is hidden, and one below
+        while (strip.range_of(lip) <= 0.0 || strip.range_of(lip) >= from_m)
+            ++lip;
+        int last = lip;
+        while (strip.range_of(last) > free_range_m)
+            ++last;
+        ASSERT_GE(last - lip, 4) << from_m;
+        ASSERT_LE(last - lip, 12) << from_m;
+    }
+}
+
 TEST(Sectors, GapBeforeAThingIsTheThings) {
     Strip strip;
     strip.world.boxes.push_back({1.9, 0.0, 0.8, 0.5, 0.6});
