@@ -87,7 +87,12 @@ void judge_pair(const PairEvidence& pair, const Limits& limits, Reasons& reasons
         reasons.add(Reason::kBlurred);
 }
 
-// The camera turned as the ground seems to have.
+double largest_step(const State& state, const Limits& limits) {
+    return det::radians(limits.max_attitude_step_deg) * static_cast<double>(state.frames_since + 1);
+}
+
+// The camera turned as the ground seems to have. What the attitude does not explain must not be a jump
+// itself: an input that stands still excuses none.
 bool turned_alike(const Evidence& evidence, const State& state, const Limits& limits) {
     const AttitudeInput& now = evidence.attitude;
     const AttitudeInput& then = state.attitude;
@@ -96,15 +101,15 @@ bool turned_alike(const Evidence& evidence, const State& state, const Limits& li
     if (!at_most(now.sigma_rad, 0.5 * gap) || !at_most(then.sigma_rad, 0.5 * gap)) return false;
     const GroundPose& pose = evidence.ground.pose;
     const GroundPose& last = state.ground.pose;
-    return magnitude_at_most((pose.pitch_rad - last.pitch_rad) - (now.pitch_rad - then.pitch_rad), gap) &&
-           magnitude_at_most((pose.roll_rad - last.roll_rad) - (now.roll_rad - then.roll_rad), gap);
+    const double left = std::min(gap, largest_step(state, limits));
+    return magnitude_at_most((pose.pitch_rad - last.pitch_rad) - (now.pitch_rad - then.pitch_rad), left) &&
+           magnitude_at_most((pose.roll_rad - last.roll_rad) - (now.roll_rad - then.roll_rad), left);
 }
 
 bool jumped(const Ground& own, const State& state, const Limits& limits) {
     if (!state.ground.metric) return false;
     if (!own.metric) return true;  // where it went cannot be said
-    const double step =
-        det::radians(limits.max_attitude_step_deg) * static_cast<double>(state.frames_since + 1);
+    const double step = largest_step(state, limits);
     return !magnitude_at_most(own.pose.pitch_rad - state.ground.pose.pitch_rad, step) ||
            !magnitude_at_most(own.pose.roll_rad - state.ground.pose.roll_rad, step);
 }

@@ -96,10 +96,10 @@ struct Decision {
 // Without validity checks every pixel has a disparity: density and blocked view say nothing, so kUnchecked.
 //
 // kPoseJump compares with the remembered ground while that is fresh. A step beyond max_attitude_step_deg is
-// none where the attitude input changed by as much since then, within max_attitude_gap_deg: compared are
-// changes, not angles, because the ground slopes and gravity does not. A stamp before the remembered one
-// means that the source began again: the memory does not count. Worse evidence never gives a better verdict
-// or use.
+// none where the attitude input changed by as much since then, within max_attitude_gap_deg and within a step
+// that would be none: compared are changes, not angles, because the ground slopes and gravity does not. A
+// stamp before the remembered one means that the source began again: the memory does not count. Worse
+// evidence never gives a better verdict or use.
 Decision decide(const Evidence& evidence, const State& state, std::int64_t now_mono_ns, const Limits& limits);
 
 // The state after that decision. Remembered is a ground whose only reasons are kNoMountPrior, kUncalibrated,

@@ -331,10 +331,10 @@ TEST(Verdict, AStepThatTheAttitudeMadeTooIsNoJump) {
         bool jump;
     } table[] = {
         {15.0, 1.0, attitude(-10, 0), attitude(-5, 0), false},
-        {15.0, 1.0, attitude(-10, 0), attitude(-7.9, 0), false},
-        {15.0, 1.0, attitude(-10, 0), attitude(-8.1, 0), true},
-        {15.0, 1.0, attitude(-10, 0), attitude(-2.1, 0), false},
-        {15.0, 1.0, attitude(-10, 0), attitude(-1.9, 0), true},
+        {15.0, 1.0, attitude(-10, 0), attitude(-6.9, 0), false},
+        {15.0, 1.0, attitude(-10, 0), attitude(-7.1, 0), true},
+        {15.0, 1.0, attitude(-10, 0), attitude(-3.1, 0), false},
+        {15.0, 1.0, attitude(-10, 0), attitude(-2.9, 0), true},
         {15.0, 1.0, attitude(-10, 0), attitude(-15, 0), true},
         {10.0, 8.0, attitude(0, 0), attitude(0, 7), false},
         {10.0, 8.0, attitude(0, 0), attitude(0, 3.9), true},
@@ -345,6 +345,7 @@ TEST(Verdict, AStepThatTheAttitudeMadeTooIsNoJump) {
         {15.0, 1.0, attitude(0, 0), attitude(kNaN, 0), true},
         {15.0, 1.0, AttitudeInput{}, attitude(5, 0), true},
         {15.0, 1.0, attitude(-5, 0), AttitudeInput{}, true},
+        {12.9, 1.0, attitude(0, 0), attitude(0, 0), true},  // it stands still and excuses nothing
         // Steps that a robot makes need no witness.
         {11.0, 1.0, attitude(0, 0), attitude(30, 0), false},
     };
