@@ -27,6 +27,7 @@ enum class Count : std::uint8_t {
     kCameraSingles,      // pictures without one of the other eye
     kCameraSuperseded,   // pairs that a newer one replaced before they were read
     kCameraRestarts,     // cameras closed for a fault or because they stalled
+    kAttitudesTaken,     // attitudes handed to the capture thread
     kAttitudesRefused,   // attitudes of another time, out of order or not numbers
     kCount,
 };
@@ -35,7 +36,7 @@ inline constexpr std::array<std::string_view, static_cast<std::size_t>(Count::kC
     "frames_halved",     "resolution_changes", "results_overwritten", "results_delivered",
     "sink_failures",     "disparity_clamped",  "publish_failures",    "health_overwritten",
     "camera_gaps",       "camera_damaged",     "camera_left_out",     "camera_singles",
-    "camera_superseded", "camera_restarts",    "attitudes_refused"};
+    "camera_superseded", "camera_restarts",    "attitudes_taken",     "attitudes_refused"};
 
 // Raised from any thread, wait-free; a reader sees each counter on its own, not a common instant.
 class Counters {

@@ -113,8 +113,8 @@ struct Parts {
         arena.seal();
     }
 
-    // The pipeline's run; on a thread of its own, which becomes the capture thread.
-    void run(const std::atomic<bool>& stop) {
+    // Before any thread runs: from then on the settings are the supervisor's.
+    pipeline::RunOptions run_options() {
         pipeline::RunOptions options;
         options.rest = settings.realtime.on;
         if (!info().live) {
@@ -131,6 +131,11 @@ struct Parts {
             if (role != pipeline::ThreadRole::kCapture || !driver.opened.rig) real_time.adopt(role);
             ++threads;
         };
+        return options;
+    }
+
+    // The pipeline's run; on a thread of its own, which becomes the capture thread.
+    void run(const pipeline::RunOptions& options, const std::atomic<bool>& stop) {
         // Counted by the pipeline; the supervisor says so.
         running.run(
             options, stop, [](const FrameStamp&, const std::string&) {}, report);
@@ -273,9 +278,11 @@ ExitStatus run_daemon(const DaemonOptions& options) {
     std::string failure;  // of the pipeline's start; written before pipeline_ended, like the report
     std::atomic<bool> pipeline_ended{false};
     std::atomic<bool> health_ended{false};
-    std::atomic<bool> attitude_ended{!parts->settings.attitude.input};
+    const bool attitude_input = parts->settings.attitude.input;
+    std::atomic<bool> attitude_ended{!attitude_input};
+    const pipeline::RunOptions run_options = parts->run_options();
     Supervisor supervisor({parts->running, parts->counters, parts->tracker, parts->health, manager,
-                           parts->real_time, parts->driver.cameras, pipeline_ended,
+                           parts->real_time, parts->driver.cameras, attitude_input, pipeline_ended,
                            [&] { parts->reload(options); }});
     std::jthread health;
     std::jthread attitude;
@@ -300,7 +307,7 @@ ExitStatus run_daemon(const DaemonOptions& options) {
         supervisor.send_health();
         health_ended = true;
     });
-    if (parts->settings.attitude.input)
+    if (attitude_input)
         attitude = std::jthread([&] {
             pthread_setname_np(pthread_self(), "gl-attitude");
             parts->receive_attitudes(stop);
@@ -308,7 +315,7 @@ ExitStatus run_daemon(const DaemonOptions& options) {
         });
     pipeline = std::jthread([&] {
         try {
-            parts->run(stop);
+            parts->run(run_options, stop);
         } catch (const std::exception& fault) {
             failure = fault.what();  // no more threads, say
         }

@@ -98,6 +98,7 @@ void Supervisor::tick(std::int64_t now_mono_ns) {
     host_.realtime_scheduling = watched_.real_time.scheduling() ? 1 : 0;
     host_.memory_locked = watched_.real_time.memory_locked() ? 1 : 0;
     look_at_cameras();
+    look_at_attitudes(now_mono_ns);
     watched_.tracker.add(host_);
     const publish::HealthReport report = watched_.tracker.report(now_utime_us(), now_mono_ns);
     hand_over_health(report);
@@ -124,6 +125,20 @@ void Supervisor::look_at_cameras() {
     watched_.cameras->take_notices([](const capture::CameraNotice& notice) {
         log().log(notice.good ? spdlog::level::info : spdlog::level::warn, "{}", notice.sentence.view());
     });
+}
+
+void Supervisor::look_at_attitudes(std::int64_t now_mono_ns) {
+    if (!watched_.attitude_input) return;
+    const std::uint64_t taken = watched_.counters.get(Count::kAttitudesTaken);
+    if (taken != attitudes_ || attitude_mono_ns_ == 0) {
+        attitudes_ = taken;
+        attitude_mono_ns_ = now_mono_ns;
+        if (taken > 0 && std::exchange(attitudes_missing_, false)) log().info("attitudes come");
+    } else if (now_mono_ns - attitude_mono_ns_ >= kSecondNs && !std::exchange(attitudes_missing_, true)) {
+        log().warn(
+            "no attitudes for 1 s that could be used: steps of the ground that the robot makes count as "
+            "errors");
+    }
 }
 
 void Supervisor::hand_over_health(const publish::HealthReport& report) {

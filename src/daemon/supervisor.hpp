@@ -28,6 +28,7 @@ struct Watched {
     ServiceManager& manager;
     RealTime& real_time;
     capture::CameraSource* cameras;  // null where pairs do not come from live cameras
+    bool attitude_input;             // attitudes are received
     const std::atomic<bool>& pipeline_ended;
     // Reads the configuration again; says in the log what came of it.
     std::function<void()> reload;
@@ -53,6 +54,7 @@ class Supervisor {
     void look_at_cameras();
     void watch(std::int64_t now_mono_ns);
     void log_changes(const publish::HealthReport& report, std::int64_t now_mono_ns);
+    void look_at_attitudes(std::int64_t now_mono_ns);
     void tell_status(const publish::HealthReport& report, std::int64_t now_mono_ns);
     void hand_over_health(const publish::HealthReport& report);
 
@@ -78,6 +80,9 @@ class Supervisor {
     std::int64_t state_mono_ns_ = 0;
     std::uint64_t logged_bad_ = 0;
     std::int64_t bad_mono_ns_ = 0;
+    std::uint64_t attitudes_ = 0;
+    std::int64_t attitude_mono_ns_ = 0;
+    bool attitudes_missing_ = false;
     std::size_t logged_lost_ = 0;
     std::int64_t lost_mono_ns_ = 0;
 };

@@ -3,6 +3,7 @@
 #include <lcm/lcm.h>
 
 #include <chrono>
+#include <optional>
 #include <string>
 #include <thread>
 
@@ -17,6 +18,14 @@ namespace {
 constexpr std::int64_t kOldestUs = 1'000'000;
 constexpr std::int64_t kAheadUs = 5'000;
 
+// LCM takes the name of a channel for a regular expression.
+std::string pattern_of(const std::string& name) {
+    std::string pattern;
+    for (const char letter : name)
+        pattern += letter == '.' ? std::string("[.]") : std::string(1, letter);
+    return pattern;
+}
+
 void receive_message(const lcm_recv_buf_t* message, const char* /*channel*/, void* user) {
     static_cast<AttitudeReceiver*>(user)->take(message->data, message->data_size);
 }
@@ -26,18 +35,19 @@ void receive_message(const lcm_recv_buf_t* message, const char* /*channel*/, voi
 struct AttitudeReceiver::Parts {
     Parts(const LcmOptions& from, pipeline::AttitudeHandOver& to)
         : options(from),
-          channel(checked_prefix(from.prefix) + "_ATTITUDE"),
-          link(resolve_url(from.url)),
+          channel(pattern_of(checked_prefix(from.prefix)) + "_ATTITUDE"),
+          link(std::in_place, resolve_url(from.url)),
           out(to) {}
 
     std::int64_t now() const { return options.clock != nullptr ? options.clock() : now_mono_ns(); }
 
     LcmOptions options;
     std::string channel;
-    LcmLink link;
+    std::optional<LcmLink> link;
     pipeline::AttitudeHandOver& out;
     pipeline::AttitudeHistory history;
     bool subscribed = false;
+    std::int64_t heard_mono_ns = 0;  // or subscribed
     attitude_t message{};
 };
 
@@ -46,24 +56,29 @@ AttitudeReceiver::AttitudeReceiver(const LcmOptions& options, pipeline::Attitude
 AttitudeReceiver::~AttitudeReceiver() = default;
 
 _lcm_t* AttitudeReceiver::handle() const {
-    return parts_->link.handle();
+    return parts_->link->handle();
 }
 
 void AttitudeReceiver::receive(int wait_ms) {
     Parts& parts = *parts_;
-    const bool open = parts.link.open(parts.now());
-    if (open && !parts.subscribed)
+    if (!parts.subscribed && parts.link->open(parts.now())) {
         parts.subscribed =
-            lcm_subscribe(parts.link.handle(), parts.channel.c_str(), receive_message, this) != nullptr;
-    // A connection that is lost stays so with LCM: it says that at once, and again and again.
-    if (!parts.subscribed || lcm_handle_timeout(parts.link.handle(), wait_ms) < 0)
-        std::this_thread::sleep_for(std::chrono::milliseconds(wait_ms));
+            lcm_subscribe(parts.link->handle(), parts.channel.c_str(), receive_message, this) != nullptr;
+        parts.heard_mono_ns = parts.now();
+    }
+    const bool failed = parts.subscribed && lcm_handle_timeout(parts.link->handle(), wait_ms) < 0;
+    if (!parts.subscribed || failed) std::this_thread::sleep_for(std::chrono::milliseconds(wait_ms));
+    if (failed || (parts.subscribed && parts.now() - parts.heard_mono_ns >= kSilentNs)) {
+        parts.link.emplace(parts.link->url());
+        parts.subscribed = false;
+    }
 }
 
 void AttitudeReceiver::take(const void* bytes, std::uint32_t size) {
     using Taken = pipeline::AttitudeHistory::Taken;
     Parts& parts = *parts_;
     attitude_t& message = parts.message;
+    parts.heard_mono_ns = parts.now();
     Taken taken = Taken::kRefused;
     if (message.decode(bytes, 0, static_cast<int>(size)) == static_cast<int>(size)) {
         const std::int64_t utime_us = now_utime_us();
@@ -73,8 +88,9 @@ void AttitudeReceiver::take(const void* bytes, std::uint32_t size) {
             taken = parts.history.add({parts.now() - 1000 * (utime_us - message.utime), message.pitch_rad,
                                        message.roll_rad, message.sigma_rad});
     }
-    if (taken == Taken::kRefused && parts.options.counters != nullptr)
-        parts.options.counters->add(Count::kAttitudesRefused);
+    if (taken != Taken::kTooClose && parts.options.counters != nullptr)
+        parts.options.counters->add(taken == Taken::kKept ? Count::kAttitudesTaken
+                                                          : Count::kAttitudesRefused);
     if (taken != Taken::kKept) return;
     *parts.out.begin_write() = parts.history;
     parts.out.commit();

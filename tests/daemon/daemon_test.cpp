@@ -254,9 +254,15 @@ TEST_F(Daemon, TakesAttitudesWhereItIsToldTo) {
     };
     Service service(start({"--set", "attitude.input=on"}));
     ASSERT_TRUE(ready(service)) << service.said();
+    EXPECT_TRUE(eventually([&] { return service.says("no attitudes for 1 s"); })) << service.said();
     attitude_t attitude{};  // of 1970
     ASSERT_TRUE(robot.until([&] { return robot.send("GROUNDLINE_ATTITUDE", attitude) && refused() > 0; }))
         << service.said();
+    EXPECT_TRUE(robot.until([&] {
+        const auto now = std::chrono::system_clock::now().time_since_epoch();
+        attitude.utime = std::chrono::duration_cast<std::chrono::microseconds>(now).count();
+        return robot.send("GROUNDLINE_ATTITUDE", attitude) && service.says("attitudes come");
+    })) << service.said();
     int status = -1;
     service.end_ms(SIGTERM, status);
     EXPECT_EQ(status, 0);

@@ -72,6 +72,7 @@ TEST(AttitudeReceiver, HandsOnWhatComesOverLcm) {
     EXPECT_EQ(taken.roll_rad, -0.125);
     EXPECT_EQ(taken.sigma_rad, 0.5);
     EXPECT_EQ(robot.refused(), 0U);
+    EXPECT_EQ(robot.counters.get(Count::kAttitudesTaken), 1U);
 }
 
 // The sender's wall clock is compared with ours at arrival, and only the age goes to the pictures' clock.
@@ -117,6 +118,37 @@ TEST(AttitudeReceiver, RefusesAndCountsWhatIsOfNoUse) {
     give(robot.receiver, bytes_of(attitude(0)));
     EXPECT_EQ(robot.refused(), refused);
     EXPECT_NE(robot.out.newest(), nullptr);
+}
+
+TEST(AttitudeReceiver, ADotInThePrefixIsADot) {
+    Receiver robot;
+    robot.options.prefix = "robot.1";
+    AttitudeReceiver receiver(robot.options, robot.out);
+    receiver.receive(1);
+    const std::vector<std::uint8_t> bytes = bytes_of(attitude(0));
+    for (const char* channel : {"robotX1_ATTITUDE", "robot.1_ATTITUDE"}) {
+        lcm_publish(receiver.handle(), channel, bytes.data(), static_cast<unsigned>(bytes.size()));
+        receiver.receive(50);
+        EXPECT_EQ(robot.out.newest() != nullptr, channel[5] == '.') << channel;
+    }
+}
+
+TEST(AttitudeReceiver, OpensAfreshWhereNothingComes) {
+    Receiver robot;
+    robot.receiver.receive(1);
+    ASSERT_NE(robot.receiver.handle(), nullptr);
+    fake_now_ns += AttitudeReceiver::kSilentNs - kMs;
+    robot.receiver.receive(1);
+    ASSERT_NE(robot.receiver.handle(), nullptr);
+    give(robot.receiver, bytes_of(attitude(0)));
+    fake_now_ns += AttitudeReceiver::kSilentNs - kMs;
+    robot.receiver.receive(1);
+    ASSERT_NE(robot.receiver.handle(), nullptr) << "something came in between";
+    fake_now_ns += kMs;
+    robot.receiver.receive(1);
+    EXPECT_EQ(robot.receiver.handle(), nullptr);
+    robot.receiver.receive(1);
+    EXPECT_NE(robot.receiver.handle(), nullptr);
 }
 
 TEST(AttitudeReceiver, WaitsWhereLcmDoesNotOpen) {

@@ -309,13 +309,14 @@ TEST(Messages, HealthBytes) {
     for (const char* stage : {"read", "rectify", "match", "ground", "classify", "write", "publish"})
         golden.text(stage).reals({first++, 2.0, 3.0});
     golden.text("all_stages").reals({25.0, 26.0, 27.0});
-    golden.text("exposure_to_publish").reals({50.0, 60.0, 70.0}).i32(20);
+    golden.text("exposure_to_publish").reals({50.0, 60.0, 70.0}).i32(21);
     std::int64_t count = 1000;
     for (const char* name :
-         {"frames_read", "frames_bad", "frames_overwritten", "frames_processed", "frames_halved",
-          "resolution_changes", "results_overwritten", "results_delivered", "sink_failures",
-          "disparity_clamped", "publish_failures", "health_overwritten", "camera_gaps", "camera_damaged",
-          "camera_left_out", "camera_singles", "camera_superseded", "camera_restarts", "attitudes_refused"})
+         {"frames_read",       "frames_bad",         "frames_overwritten",  "frames_processed",
+          "frames_halved",     "resolution_changes", "results_overwritten", "results_delivered",
+          "sink_failures",     "disparity_clamped",  "publish_failures",    "health_overwritten",
+          "camera_gaps",       "camera_damaged",     "camera_left_out",     "camera_singles",
+          "camera_superseded", "camera_restarts",    "attitudes_taken",     "attitudes_refused"})
         golden.text(name).i64(count++);
     golden.text("lcm_open_failures").i64(5);
     golden.reals({0.25, -2.0, 1.03, -1.5}).i8(2).reals({4.5, 100.0, 90.0, 0.25, 0.125}).text("left is gone");
