@@ -21,7 +21,7 @@ esac
 if ((EUID != 0)); then exec sudo --preserve-env=http_proxy,https_proxy "$0" "$@"; fi
 command -v mmdebstrap >/dev/null || die "Please install mmdebstrap, then start again."
 architecture=$1
-root=$(realpath -m "$2")
+folder=$(realpath -m "$2")
 shift 2
 # shellcheck source=/dev/null
 suite=$(. /etc/os-release && echo "$VERSION_CODENAME")
@@ -37,7 +37,8 @@ while (($#)); do
     esac
     shift 2
 done
-if [[ -e $root && ! -e $root/made && ! -e $root/usr/include ]]; then die "$root exists and is no sysroot."; fi
+# Only what this script made is replaced, and only by a whole one.
+if [[ -e $folder && ! -e $folder/made-by && -n $(ls -A "$folder") ]]; then die "$folder is not empty and no sysroot of ours."; fi
 
 # What the programs, the tests and the benchmarks are built with; OpenCV by modules, because libopencv-dev brings all.
 packages=(libc6-dev libopencv-core-dev libopencv-imgproc-dev libopencv-calib3d-dev libopencv-imgcodecs-dev
@@ -59,7 +60,9 @@ fi
 # dpkg-shlibdeps learns from these which package, in which version, a library means; it finds them in a folder DEBIAN
 # above the library, which takes the place of dpkg's own records that an unpacked tree does not have.
 work=$(mktemp -d "${TMPDIR:-/var/tmp}/groundline-sysroot.XXXXXX")
-trap 'rm -rf "$work"' EXIT
+mkdir -p "$(dirname "$folder")"
+root=$(mktemp -d "$folder.XXXXXX")
+trap 'rm -rf --one-file-system "$work" "$root"' EXIT
 cat >"$work/records" <<'SHELL'
 #!/bin/sh
 mkdir "$1/DEBIAN"
@@ -74,7 +77,7 @@ chmod 755 "$work" "$work/records"
 # unpack LINE...: a tree from these archives.
 unpack() {
     rm -rf --one-file-system "$root"
-    mkdir -p "$root"
+    mkdir "$root"
     mmdebstrap --quiet --mode=root --variant=extract --format=directory --architectures="$architecture" \
         --hook-dir=/usr/share/mmdebstrap/hooks/merged-usr --extract-hook="$work/records \"\$1\"" \
         --dpkgopt='path-exclude=/usr/share/doc/*' --dpkgopt='path-exclude=/usr/share/man/*' \
@@ -107,4 +110,6 @@ rm -rf "$root"/var/{cache,lib}/apt
 mv "$root/packages" "$root/made"
 cp "$0" "$root/made-by" # by which ./dev sees whether this script has changed
 chown -R --reference="$root/.." "$root"
-echo "Sysroot of $architecture: $(wc -l <"$root/made") packages, $(du -sh "$root" | cut -f1), made in $SECONDS s."
+rm -rf --one-file-system "$folder"
+mv "$root" "$folder"
+echo "Sysroot of $architecture: $(wc -l <"$folder/made") packages, $(du -sh "$folder" | cut -f1), made in $SECONDS s."
