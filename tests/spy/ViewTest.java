@@ -2,6 +2,7 @@ package groundline.spy;
 
 import groundline.ground_t;
 import groundline.mask_t;
+import groundline.sectors_t;
 import groundline.vdisparity_t;
 import java.awt.Dimension;
 import java.awt.Graphics2D;
@@ -10,6 +11,7 @@ import java.io.EOFException;
 import java.io.File;
 import javax.imageio.ImageIO;
 import lcm.lcm.LCMDataInputStream;
+import lcm.lcm.LCMDataOutputStream;
 import lcm.logging.Log;
 
 /** LOG PNG: the masks of a log have the shares of classes that the ground messages say, and the view draws them. */
@@ -17,6 +19,12 @@ public final class ViewTest {
     private static void check(boolean holds, String what) {
         if (!holds)
             throw new AssertionError(what);
+    }
+
+    private static byte[] encoded(sectors_t message) throws Exception {
+        LCMDataOutputStream out = new LCMDataOutputStream();
+        message.encode(out);
+        return out.toByteArray();
     }
 
     private static BufferedImage painted(TerrainView view) {
@@ -52,6 +60,7 @@ public final class ViewTest {
 
         mask_t mask = null;
         vdisparity_t vDisparity = null;
+        sectors_t sectors = null;
         int grounds = 0;
         Log log = new Log(words[0], "r");
         try {
@@ -60,6 +69,8 @@ public final class ViewTest {
                 view.take(event.channel, new LCMDataInputStream(event.data));
                 if (event.channel.endsWith("_MASK"))
                     mask = new mask_t(event.data);
+                if (event.channel.endsWith("_SECTORS"))
+                    sectors = new sectors_t(event.data);
                 if (event.channel.endsWith("_VDISPARITY"))
                     vDisparity = new vdisparity_t(event.data);
                 if (event.channel.endsWith("_GROUND")) {
@@ -96,11 +107,25 @@ public final class ViewTest {
         }
         check(coloured(image, 4, 6, 8, 40) > 500, "free sectors are green");
 
+        mask_t large = new mask_t();
+        large.width = large.height = large.scale = 8192;
+        large.encoding = mask_t.ENCODING_GRID;
+        large.size = 2;
+        large.data = new byte[2];
+        check(MaskDecoder.decode(large) == null, "one cell in two bytes");
+        large.width = 8193;
+        check(MaskDecoder.decode(large) == null, "more than 2^26 pixels");
         byte[] whole = mask.data;
         for (int size = 0; size < whole.length; ++size) {
             mask.size = size;
             check(MaskDecoder.decode(mask) == null, "a mask cut off at " + size);
         }
+        Thread.sleep((long) (1000 * TerrainView.STALE_S) + 100);
+        // Later sectors come through, masks do not.
+        view.take("GROUNDLINE_SECTORS", new LCMDataInputStream(encoded(sectors)));
+        BufferedImage without = painted(view);
+        check(coloured(without, 0, 4, 16, 40) == 0, "an old mask is shown beside new sectors");
+        check(coloured(without, 4, 6, 8, 40) > 500, "new sectors are shown without a mask");
         Thread.sleep((long) (1000 * TerrainView.STALE_S) + 100);
         BufferedImage stale = painted(view);
         check(coloured(stale, 0, 6, 16, 40) == 0 && coloured(stale, 0, 6, 8, 40) == 0, "an old mask is shown");

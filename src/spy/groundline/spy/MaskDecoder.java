@@ -8,7 +8,9 @@ final class MaskDecoder {
 
     /** width * height ids, row-major; null where the data is not a mask of that size. */
     static byte[] decode(mask_t mask) {
-        if (mask.width <= 0 || mask.height <= 0 || mask.scale <= 0 || (long) mask.width * mask.height > 1 << 28)
+        if (mask.width <= 0 || mask.height <= 0 || mask.scale <= 0 || (long) mask.width * mask.height > 1 << 26)
+            return null;
+        if (mask.encoding == mask_t.ENCODING_GRID && !sizedForGrid(mask))
             return null;
         byte[] classes = new byte[mask.width * mask.height];
         boolean good = mask.encoding == mask_t.ENCODING_RUNS && mask.scale == 1 ? runs(mask, classes)
@@ -39,11 +41,16 @@ final class MaskDecoder {
         return pixel == classes.length;
     }
 
+    private static int cells(int length, int scale) {
+        return (length - 1) / scale + 1;
+    }
+
+    private static boolean sizedForGrid(mask_t mask) {
+        return mask.size == (cells(mask.width, mask.scale) * cells(mask.height, mask.scale) + 3) / 4;
+    }
+
     private static boolean grid(mask_t mask, byte[] classes) {
-        int columns = (mask.width + mask.scale - 1) / mask.scale;
-        int rows = (mask.height + mask.scale - 1) / mask.scale;
-        if (mask.size != (columns * rows + 3) / 4)
-            return false;
+        int columns = cells(mask.width, mask.scale);
         for (int y = 0; y < mask.height; ++y) {
             for (int x = 0; x < mask.width; ++x) {
                 int cell = y / mask.scale * columns + x / mask.scale;

@@ -33,7 +33,7 @@ public class TerrainPlugin implements SpyPlugin {
         return new AbstractAction("groundline: mask, v-disparity, sectors") {
             @Override
             public void actionPerformed(ActionEvent event) {
-                String prefix = channel.name.substring(0, channel.name.lastIndexOf('_'));
+                String prefix = channel.name.replaceFirst("_[^_]*$", "");
                 JInternalFrame frame = new JInternalFrame(prefix, true, true, true, true);
                 frame.add(open(prefix));
                 frame.pack();
@@ -51,8 +51,8 @@ public class TerrainPlugin implements SpyPlugin {
         LCMSubscriber subscriber = (lcm, channel, in) -> {
             try {
                 view.take(channel, in);
-            } catch (IOException damaged) {
-                System.err.println(channel + ": a message that cannot be decoded: " + damaged.getMessage());
+            } catch (IOException | RuntimeException damaged) { // what else escapes ends LCM's thread
+                System.err.println(channel + ": a message that cannot be decoded: " + damaged);
             }
         };
         String channels = java.util.regex.Pattern.quote(prefix) + "_(MASK|SECTORS|GROUND|VDISPARITY|PREVIEW)";

@@ -47,6 +47,8 @@ public final class TerrainView extends JPanel {
     private vdisparity_t vDisparity;
     private sectors_t sectors;
     private long newsNs;
+    private long maskNs;
+    private long vDisparityNs;
     private boolean badMask;
 
     public TerrainView() {
@@ -61,12 +63,14 @@ public final class TerrainView extends JPanel {
             byte[] classes = MaskDecoder.decode(mask);
             badMask = classes == null;
             overlay = badMask ? null : tinted(classes, mask.width, mask.height);
+            maskNs = System.nanoTime();
         } else if (channel.endsWith("_PREVIEW")) {
             preview = new image_t(in);
         } else if (channel.endsWith("_GROUND")) {
             ground = new ground_t(in);
         } else if (channel.endsWith("_VDISPARITY")) {
             vDisparity = new vdisparity_t(in);
+            vDisparityNs = System.nanoTime();
         } else if (channel.endsWith("_SECTORS")) {
             sectors = new sectors_t(in);
         } else {
@@ -91,9 +95,9 @@ public final class TerrainView extends JPanel {
         out.setRenderingHint(RenderingHints.KEY_ANTIALIASING, RenderingHints.VALUE_ANTIALIAS_ON);
         out.setFont(getFont().deriveFont(Font.PLAIN, 14f));
         out.setColor(TEXT);
-        double silent_s = 1e-9 * (System.nanoTime() - newsNs);
-        if (newsNs == 0 || silent_s > STALE_S) {
-            String since = newsNs == 0 ? "nothing yet" : String.format("nothing for %.0f s", silent_s);
+        if (!fresh(newsNs)) {
+            String since = newsNs == 0 ? "nothing yet"
+                    : String.format("nothing for %.0f s", 1e-9 * (System.nanoTime() - newsNs));
             out.drawString(since + ": does groundlined run, and is its LCM URL ours?", 20, 30);
             return;
         }
@@ -113,6 +117,10 @@ public final class TerrainView extends JPanel {
         return sectors != null && sectors.sequence < 0;
     }
 
+    private static boolean fresh(long ns) {
+        return ns != 0 && 1e-9 * (System.nanoTime() - ns) <= STALE_S;
+    }
+
     private static Rectangle inside(int x, int y, int width, int height) {
         return new Rectangle(x + 6, y + 6, Math.max(1, width - 12), Math.max(1, height - 12));
     }
@@ -120,8 +128,9 @@ public final class TerrainView extends JPanel {
     private String headline() {
         if (withoutPairs())
             return Reasons.words(sectors.verdict, sectors.reasons);
-        if (mask == null)
-            return "";
+        if (!fresh(maskNs)) // the largest message is lost first
+            return (sectors == null ? "" : "pair " + sectors.sequence + "   " + Reasons.words(sectors.verdict, sectors.reasons))
+                    + "   no mask comes through: are the receive buffers large enough (net.core.rmem_default)?";
         String pose = ground == null || Double.isNaN(ground.height_m) ? ""
                 : String.format("   pitch %.1f°, roll %.1f°, height %.2f m", Math.toDegrees(ground.pitch_rad),
                         Math.toDegrees(ground.roll_rad), ground.height_m);
@@ -130,7 +139,7 @@ public final class TerrainView extends JPanel {
     }
 
     private void drawMask(Graphics2D out, Rectangle area) {
-        if (mask == null || overlay == null)
+        if (!fresh(maskNs) || overlay == null)
             return;
         double zoom = Math.min((double) area.width / mask.width, (double) area.height / mask.height);
         int width = (int) (zoom * mask.width);
@@ -146,7 +155,8 @@ public final class TerrainView extends JPanel {
     }
 
     private static BufferedImage image(image_t from) {
-        if (from.pixelformat != image_t.PIXEL_FORMAT_RGB || from.size < from.height * from.row_stride)
+        if (from.pixelformat != image_t.PIXEL_FORMAT_RGB || from.width <= 0 || from.height <= 0
+                || 3L * from.width > from.row_stride || from.size < (long) from.height * from.row_stride)
             return null;
         BufferedImage image = new BufferedImage(from.width, from.height, BufferedImage.TYPE_INT_RGB);
         for (int y = 0; y < from.height; ++y) {
@@ -161,12 +171,14 @@ public final class TerrainView extends JPanel {
 
     private void drawVDisparity(Graphics2D out, Rectangle area) {
         out.setColor(TEXT);
-        if (vDisparity == null || vDisparity.rows <= 0 || vDisparity.bins <= 0) {
-            out.drawString("v-disparity: publish.v_disparity is off", area.x, area.y + 14);
+        if (!fresh(vDisparityNs) || vDisparity.rows <= 0 || vDisparity.bins <= 0) {
+            out.drawString("no v-disparity: is publish.v_disparity on?", area.x, area.y + 14);
             return;
         }
+        if (vDisparity.size != (long) vDisparity.bins * vDisparity.rows)
+            return;
         BufferedImage image = new BufferedImage(vDisparity.bins, vDisparity.rows, BufferedImage.TYPE_INT_RGB);
-        for (int i = 0; i < Math.min(vDisparity.size, vDisparity.bins * vDisparity.rows); ++i) {
+        for (int i = 0; i < vDisparity.size; ++i) {
             int grey = (int) Math.round(255 * Math.sqrt((vDisparity.data[i] & 255) / 255.0)); // few pixels show too
             image.setRGB(i % vDisparity.bins, i / vDisparity.bins, grey << 16 | grey << 8 | grey);
         }
