@@ -53,10 +53,10 @@ def pack(build, folder):
 
 
 def needed_packages(debs):
-    """What the packages depend on, apart from each other and from what they are only built with."""
+    """What the packages of a robot depend on, apart from each other."""
     names = set()
     for deb in debs:
-        if not deb.name.startswith("groundline-dev_"):
+        if not deb.name.startswith(("groundline-dev_", "groundline-spy_")):
             said = subprocess.run(["dpkg-deb", "-f", deb, "Depends"], capture_output=True, text=True, check=True).stdout
             names.update(wanted.split()[0] for wanted in said.split(","))
     return sorted(names - {"groundline"})
