@@ -10,6 +10,7 @@ import robot
 
 CONFIG = pathlib.Path("/etc/groundline/groundline.yaml")
 UNIT = "groundlined.service"
+ROUTE = "239.255.76.67 dev lo proto 76 scope link"
 SCHED_FIFO = 1
 SCHED_RESET_ON_FORK = 0x40000000
 
@@ -68,7 +69,13 @@ def said():
 
 
 def routes():
-    return [line for line in robot.command("ip", "route").splitlines() if "dev lo" in line]
+    return [line.strip() for line in robot.command("ip", "route").splitlines() if "dev lo" in line]
+
+
+def expect_route():
+    """That it is there when systemd has done all that it was to do."""
+    robot.until(lambda: "No jobs" in robot.command("systemctl", "list-jobs"), "the end of systemd's jobs")
+    robot.expect(ROUTE in routes(), f"routes: {routes()}")
 
 
 def real_time_threads(process):

@@ -25,7 +25,7 @@ def install():
 
 def cameras_come(stack):
     robot.expect("default" not in robot.command("ip", "route"), "there is a network")
-    robot.expect(service.routes() == ["239.255.76.67 dev lo proto 76 scope link "], f"routes: {service.routes()}")
+    robot.expect(service.routes() == [service.ROUTE], f"routes: {service.routes()}")
     robot.until(service.active, lambda: f"the service at boot; {service.said()[-300:]}")
     service.step("the service runs")
     time.sleep(max(0.0, LATE_S - uptime_s()))
@@ -65,6 +65,7 @@ def case(stack):
     service.step("removed")
     service.install("next")
     robot.expect(robot.command("systemctl", "is-enabled", service.UNIT).strip() == "enabled", "not enabled again")
+    robot.command("systemctl", "enable", "groundlined@front.service")
     robot.command("dpkg", "--purge", "groundline-libcamera", "groundline")
     RULES.unlink()
     service.be_impatient()

@@ -1,6 +1,6 @@
 """The packages on a machine that has what they depend on: the service runs confined, in real time and with locked
 memory; refuses a wrong configuration once, naming the line; reads it again; is restarted when it hangs; bears a wall
-clock that jumps and a full disk."""
+clock that jumps and a full disk. The route of its messages is there as long as it, a replay or a rig runs."""
 import errno
 import os
 import pathlib
@@ -39,7 +39,11 @@ def fill_disk():
 
 
 def case(stack):
+    operators = pathlib.Path("/etc/sysctl.d/70-robot.conf")
+    operators.write_text("net.core.rmem_max = 9000000\n")
     service.install()
+    buffers = robot.command("sysctl", "-n", "net.core.rmem_max", "net.core.rmem_default").split()
+    robot.expect(buffers == ["9000000", "4194304"], f"buffers of sockets: {buffers}")
     robot.expect(robot.command("systemctl", "is-enabled", service.UNIT).strip() == "enabled", "not enabled")
     robot.expect(not service.active(), "started before a camera was configured")
     refused("terrain.tolerance_m: 0.3\nterrain.tolerence_m: 0.3\n", f"{service.CONFIG}:2: unknown configuration key")
@@ -54,6 +58,8 @@ def case(stack):
     robot.expect(service.start(), f"no start: {service.said()[-300:]}")
     radio = robot.Radio(stack)
     radio.wait_running()
+    service.expect_route()
+    changes = robot.Program(stack, "routes", "ip", "monitor", "route")
     process = service.show("MainPID")
     threads = service.real_time_threads(process)
     robot.expect(len(threads) >= 3, f"real-time threads: {threads}; {service.said()[-300:]}")
@@ -108,17 +114,26 @@ def case(stack):
     replay = f"groundline-replay@{robot.command('systemd-escape', '--path', str(robot.FRAMES)).strip()}.service"
     robot.command("systemctl", "start", replay)
     robot.expect(not service.active() and service.active(replay), "the replay does not take the daemon's place")
+    ended, began = (int(service.show(what, unit)) for what, unit in (("InactiveEnterTimestampMonotonic", service.UNIT),
+                                                                     ("ExecMainStartTimestampMonotonic", replay)))
+    robot.expect(ended <= began, f"the replay began {ended - began} us before the daemon ended")
+    service.expect_route()
+    robot.expect(service.ROUTE not in changes.said(), f"changes of routes: {changes.said()}")
     radio.wait_running()
     size = (radio.masks[-1].width, radio.masks[-1].height)
     robot.expect(size == robot.SIZE, f"masks of {size}, not of the recording")
     service.step("replayed")
     robot.command("systemctl", "stop", replay)
+    robot.until(lambda: service.ROUTE not in service.routes(), "the end of the route without any daemon")
 
     # One of several rigs, by a file of its own.
     service.configure({"capture_driver": "synthetic", "capture_source": "drive?width=160&height=120&focal=125",
                        "publish_prefix": "FRONT"}, service.CONFIG.with_name("front.yaml"))
     robot.command("systemctl", "start", "groundlined@front.service")
     robot.expect(service.active("groundlined@front.service"), "the rig's service does not run")
+    robot.expect(service.start(), f"no start beside the rig: {service.said()[-300:]}")
+    robot.command("systemctl", "stop", service.UNIT)
+    service.expect_route()
     return f"{len(threads)} real-time threads, {kept['VmLck'].strip()} locked; {robot.told(radio.now())}"
 
 
