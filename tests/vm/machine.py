@@ -30,24 +30,29 @@ class Machine:
                     "-kernel", str(self.image / "vmlinux"), "-initrd", str(self.image / "initrd.cpio"),
                     "-append", "console=ttyS0 root=/dev/vda rw quiet panic=-1 mitigations=off audit=0"]
         self.settings = settings
+        # The state fits a machine of just these devices, in this qemu.
+        devices = self._command("", "", "", "", "")
         version = subprocess.run(["qemu-system-x86_64", "--version"], capture_output=True, text=True, check=True)
-        state = hashlib.sha256("\n".join(settings + [version.stdout]).encode()).hexdigest()[:12]
+        state = hashlib.sha256("\n".join(devices + [version.stdout]).encode()).hexdigest()[:12]
         self.state = self.image / f"state-{state}"
         self.disk = self.image / f"state-{state}.qcow2"
+
+    def _command(self, folder, disk, shared, out, network):
+        return ["qemu-system-x86_64", *self.settings,
+                "-drive", f"{disk},if=virtio,cache=unsafe",
+                "-serial", f"file:{folder}/console",
+                "-qmp", f"unix:{folder}/qmp,server=on,wait=off",
+                "-chardev", f"socket,id=port,path={folder}/port,server=on,wait=off",
+                "-device", "virtserialport,chardev=port,name=robot",
+                # A network that reaches nothing; nor does the machine know of it until a case sets it up.
+                "-netdev", f"user,id=net,restrict=on{network}", "-device", "virtio-net-pci,netdev=net,romfile=",
+                "-virtfs", f"local,path={shared},mount_tag=w,security_model=none,readonly=on,multidevs=remap",
+                "-virtfs", f"local,path={out},mount_tag=out,security_model=none,multidevs=remap"]
 
     @contextlib.contextmanager
     def _started(self, folder, disk, shared, out, extra, network=""):
         """qemu with its sockets and console in `folder`; killed at the end."""
-        command = ["qemu-system-x86_64", *self.settings,
-                   "-drive", f"{disk},if=virtio,cache=unsafe",
-                   "-serial", f"file:{folder}/console",
-                   "-qmp", f"unix:{folder}/qmp,server=on,wait=off",
-                   "-chardev", f"socket,id=port,path={folder}/port,server=on,wait=off",
-                   "-device", "virtserialport,chardev=port,name=robot",
-                   # A network that reaches nothing; nor does the machine know of it until a case sets it up.
-                   "-netdev", f"user,id=net,restrict=on{network}", "-device", "virtio-net-pci,netdev=net,romfile=",
-                   "-virtfs", f"local,path={shared},mount_tag=w,security_model=none,readonly=on,multidevs=remap",
-                   "-virtfs", f"local,path={out},mount_tag=out,security_model=none,multidevs=remap", *extra]
+        command = [*self._command(folder, disk, shared, out, network), *extra]
         with open(f"{folder}/qemu", "w", encoding="utf-8") as said:
             process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=said, stderr=said)
         try:
@@ -131,7 +136,10 @@ class Machine:
             with self._started(folder, disk, shared, out, state, network) as process, \
                     self._connected(f"{folder}/port", process, limit) as link:
                 def start():
-                    link.sendall(f"{time.time():.3f} {command}\n".encode())
+                    try:
+                        link.sendall(f"{time.time():.3f} {command}\n".encode())
+                    except OSError as error:
+                        raise Broken(f"it died: {self._why(folder)}") from error
 
                 start()
                 rest = b""
@@ -141,6 +149,8 @@ class Machine:
                         got = link.recv(1 << 16)
                     except TimeoutError:
                         return None
+                    except OSError:  # its end, where something sent was not read
+                        got = b""
                     if not got:
                         raise Broken(f"it died: {self._why(folder)}")
                     *lines, rest = (rest + got).split(b"\n")

@@ -29,10 +29,11 @@ FRAMES = 130
 
 
 def pack(build, folder):
-    """The Debian packages of the build in folder/this, and in folder/next what an upgrade would bring: the same in a
-    later version, with one line more in the configuration file."""
+    """The Debian packages of a robot in folder/this, from the build, and in folder/next what an upgrade would bring: the
+    same in a later version, with one line more in the configuration file."""
     shutil.rmtree(folder, ignore_errors=True)
-    packed = subprocess.run(["cpack", "--config", build / "CPackConfig.cmake", "-B", folder / "this"], check=False,
+    packed = subprocess.run(["cpack", "--config", build / "CPackConfig.cmake", "-B", folder / "this",
+                             "-D", "CPACK_COMPONENTS_ALL=groundline;libcamera"], check=False,
                             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     if packed.returncode != 0:
         sys.exit(f"The packages cannot be made: {packed.stdout}")
@@ -53,12 +54,11 @@ def pack(build, folder):
 
 
 def needed_packages(debs):
-    """What the packages of a robot depend on, apart from each other."""
+    """What the packages depend on, apart from each other."""
     names = set()
     for deb in debs:
-        if not deb.name.startswith(("groundline-dev_", "groundline-spy_")):
-            said = subprocess.run(["dpkg-deb", "-f", deb, "Depends"], capture_output=True, text=True, check=True).stdout
-            names.update(wanted.split()[0] for wanted in said.split(","))
+        said = subprocess.run(["dpkg-deb", "-f", deb, "Depends"], capture_output=True, text=True, check=True).stdout
+        names.update(wanted.split()[0] for wanted in said.split(","))
     return sorted(names - {"groundline"})
 
 
