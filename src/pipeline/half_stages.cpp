@@ -8,9 +8,6 @@
 #include "terrain/v_disparity.hpp"
 
 namespace groundline::pipeline {
-namespace {
-
-constexpr int kRowsPerTask = 16;
 
 StagesConfig halved(const StagesConfig& config) {
     StagesConfig half = config;
@@ -20,8 +17,15 @@ StagesConfig halved(const StagesConfig& config) {
         half.matcher.kind = stereo::MatcherKind::kCensus;
     half.matcher.min_disparity = range.min_disparity;
     half.matcher.disparities = range.disparities;
+    terrain::TerrainConfig& terrain = half.terrain;
+    terrain.min_pixels_far =
+        std::min(terrain.min_pixels_far, std::max(terrain.min_pixels, (terrain.min_pixels_far + 3) / 4));
     return half;
 }
+
+namespace {
+
+constexpr int kRowsPerTask = 16;
 
 // Marked where any pixel that it stands for is.
 ConstImageView<std::uint8_t> halved(ConstImageView<std::uint8_t> marked, Arena& arena) {

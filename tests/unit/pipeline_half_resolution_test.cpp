@@ -204,6 +204,39 @@ TEST(HalfResolution, ShowsTheSameGroundAndTheSameThings) {
     }
 }
 
+// What is about the matcher stays, whose window has as many px at any size: less would show as free what is
+// unknown. What is about far things is scaled.
+TEST(HalfResolution, ScalesTheLimitsThatAreAboutTheWorld) {
+    StagesConfig whole;
+    whole.matcher.min_disparity = -6;
+    whole.matcher.disparities = 96;
+    whole.matcher.limits.speckle_px = 90;
+    whole.terrain.gap_px = 7;
+    whole.terrain.blur_px = 5;
+    whole.terrain.blur_beyond_px = 9;
+    whole.terrain.min_pixels = 11;
+    struct Row {
+        int whole, half;
+    };
+    // Rounded up, never below min_pixels, never raised.
+    for (const Row row : {Row{400, 100}, Row{61, 16}, Row{60, 15}, Row{40, 11}, Row{11, 11}, Row{8, 8}}) {
+        whole.terrain.min_pixels_far = row.whole;
+        const StagesConfig half = halved(whole);
+        EXPECT_EQ(half.terrain.min_pixels_far, row.half) << row.whole;
+        EXPECT_EQ(half.terrain.min_pixels, 11);
+        EXPECT_EQ(half.terrain.gap_px, 7);
+        EXPECT_EQ(half.terrain.blur_px, 5);
+        EXPECT_EQ(half.terrain.blur_beyond_px, 9);
+        EXPECT_EQ(half.terrain.sigma_disparity_px, whole.terrain.sigma_disparity_px);
+        EXPECT_EQ(half.terrain.min_area_m2, whole.terrain.min_area_m2);
+        EXPECT_EQ(half.matcher.limits.speckle_px, 90);
+        EXPECT_EQ(half.matcher.limits.left_right_px, whole.matcher.limits.left_right_px);
+        EXPECT_EQ(half.matcher.min_disparity, -3);
+        EXPECT_EQ(half.matcher.disparities, 48);
+        EXPECT_EQ(half.matcher.kind, stereo::MatcherKind::kCensus);
+    }
+}
+
 // Of what stands at least a quarter of a metre high and both cameras see.
 TEST(HalfResolution, ShowsNoObstacleAsFree) {
     Serial serial;
