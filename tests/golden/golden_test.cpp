@@ -66,8 +66,11 @@ struct Case {
     Cameras cameras = Cameras::kIdeal;
     terrain::LineMode line = terrain::LineMode::kVotes;
     bool inertial = false;  // another sensor tells the attitude, 1 degree beside what is rendered
+    verdict::HalfResolution half = verdict::HalfResolution::kNever;
+    std::array<FrameMode, 4> modes = {};  // of the frames, in their order
 };
 using stereo::MatcherKind;
+using verdict::HalfResolution;
 
 // Each frame has 320x240 pixels: emulated, all of them take 40 s of a processor.
 constexpr Case kCases[] = {
@@ -87,6 +90,18 @@ constexpr Case kCases[] = {
      terrain::LineMode::kLongest},
     {"attitude", "boxes?seed=6&pitch_deg=15&roll_deg=3", 1, MatcherKind::kCensusPyramid, false,
      Cameras::kIdeal, terrain::LineMode::kVotes, true},
+    {.name = "half",
+     .scene = "boxes?seed=3&rocks=3",
+     .frames = 1,
+     .matcher = MatcherKind::kCensusPyramid,
+     .cameras = Cameras::kLenses,
+     .half = HalfResolution::kAlways},
+    {.name = "full_half_full",
+     .scene = "drive?seed=5",
+     .frames = 4,
+     .matcher = MatcherKind::kCensusPyramid,
+     .half = HalfResolution::kWhenOverloaded,
+     .modes = {FrameMode::kFull, FrameMode::kHalfResolution, FrameMode::kHalfResolution, FrameMode::kFull}},
 };
 
 // FNV-1a, low byte first; numbers by their bits.
@@ -204,6 +219,7 @@ class Replay {
     Hashes hashes() {
         for (int frame = 0; frame < of_.frames; ++frame) {
             StereoFrame pair = pairs_.at(frame);
+            pair.mode = of_.modes[static_cast<std::size_t>(frame)];
             if (of_.inertial) pair.attitude = {true, 0.28, 0.05, 0.02};
             processor_.process(pair, result_);
             add_frame(pair);
@@ -223,6 +239,7 @@ class Replay {
         config.matcher.normalise_local_mean = of_.normalise;
         config.matcher.disparities = 64;
         config.terrain.line = of_.line;
+        config.half_resolution = of_.half;
         config.grid.on = of_.cameras != Cameras::kUncalibrated;
         if (of_.cameras == Cameras::kLenses) {
             for (int y = 0; y < rig().height; ++y)
