@@ -1,5 +1,5 @@
 """`./dev deploy` from the computer outside: at first the configuration is missing and the way out is said; with one, and
-the same version installed already, the service runs."""
+the same version installed already, the service runs; where it is disabled and a rig runs, the rig's is restarted alone."""
 import pathlib
 import subprocess
 
@@ -39,6 +39,17 @@ def case(stack):
     robot.expect(status == 0 and "active (running)" in said, f"status {status}: {said[-400:]}")
     robot.expect(service.active(), f"not active: {service.said()[-300:]}")
     robot.expect("synthetic" in service.CONFIG.read_text(), "the configuration was changed")
+
+    service.configure({"capture_driver": "synthetic", "capture_source": "drive?width=160&height=120&focal=125",
+                       "publish_prefix": "FRONT"}, service.CONFIG.with_name("front.yaml"))
+    robot.command("systemctl", "disable", "--now", service.UNIT)
+    rig = "groundlined@front.service"
+    robot.command("systemctl", "start", rig)
+    process = service.show("MainPID", rig)
+    status, told = deploy(3)
+    robot.expect(status == 0 and rig in told and "active (running)" in told, f"status {status}: {told[-400:]}")
+    robot.expect(not service.active() and service.active(rig) and service.show("MainPID", rig) != process,
+                 f"{service.UNIT} {service.active()}, {rig} {service.active(rig)}")
     left = subprocess.run("ls -d /tmp/groundline-deploy.*", shell=True, capture_output=True, text=True, check=False).stdout
     robot.expect(not left, f"left over there: {left}")
     return said.splitlines()[0]
