@@ -69,7 +69,8 @@ void AttitudeReceiver::receive(int wait_ms) {
     const bool failed = parts.subscribed && lcm_handle_timeout(parts.link->handle(), wait_ms) < 0;
     if (!parts.subscribed || failed) std::this_thread::sleep_for(std::chrono::milliseconds(wait_ms));
     if (failed || (parts.subscribed && parts.now() - parts.heard_mono_ns >= kSilentNs)) {
-        parts.link.emplace(parts.link->url());
+        const std::string url = parts.link->url();  // emplace() ends the one it is taken from first
+        parts.link.emplace(url);
         parts.subscribed = false;
     }
 }

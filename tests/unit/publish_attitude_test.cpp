@@ -135,20 +135,22 @@ TEST(AttitudeReceiver, ADotInThePrefixIsADot) {
 
 TEST(AttitudeReceiver, OpensAfreshWhereNothingComes) {
     Receiver robot;
-    robot.receiver.receive(1);
-    ASSERT_NE(robot.receiver.handle(), nullptr);
+    robot.options.url = "memq://a-name-longer-than-a-string-holds-in-itself";
+    AttitudeReceiver receiver(robot.options, robot.out);
+    receiver.receive(1);
+    ASSERT_NE(receiver.handle(), nullptr);
     fake_now_ns += AttitudeReceiver::kSilentNs - kMs;
-    robot.receiver.receive(1);
-    ASSERT_NE(robot.receiver.handle(), nullptr);
-    give(robot.receiver, bytes_of(attitude(0)));
+    receiver.receive(1);
+    ASSERT_NE(receiver.handle(), nullptr);
+    give(receiver, bytes_of(attitude(0)));
     fake_now_ns += AttitudeReceiver::kSilentNs - kMs;
-    robot.receiver.receive(1);
-    ASSERT_NE(robot.receiver.handle(), nullptr) << "something came in between";
+    receiver.receive(1);
+    ASSERT_NE(receiver.handle(), nullptr) << "something came in between";
     fake_now_ns += kMs;
-    robot.receiver.receive(1);
-    EXPECT_EQ(robot.receiver.handle(), nullptr);
-    robot.receiver.receive(1);
-    EXPECT_NE(robot.receiver.handle(), nullptr);
+    receiver.receive(1);
+    EXPECT_EQ(receiver.handle(), nullptr);
+    receiver.receive(1);
+    EXPECT_NE(receiver.handle(), nullptr);
 }
 
 TEST(AttitudeReceiver, WaitsWhereLcmDoesNotOpen) {
